@@ -1,0 +1,18 @@
+//! Two render actions on the CPU.
+//!
+//! - [`reference`]: f64, cell by cell, with an enclosure for each pixel. Slow, plain and right.
+//! - [`fast`]: the action `cpu`: f32, all cores, the widest vector unit found.
+
+pub mod fast;
+pub mod reference;
+
+use volact_core::{Registry, registry::RegisterError};
+
+/// Registers both actions.
+///
+/// # Errors
+/// If a name is taken.
+pub fn register(registry: &mut Registry) -> Result<(), RegisterError> {
+    reference::register(registry)?;
+    fast::register(registry)
+}

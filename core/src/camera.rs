@@ -1,0 +1,472 @@
+//! Cameras and rays. World space is right-handed; image row 0 is at the top; the centre of pixel
+//! (x, y) lies at (x + ½, y + ½).
+//!
+//! Along a ray, `t` is the world distance from the eye (perspective) or from the plane through
+//! the world's origin at right angles to the rays (orthographic). The sampling lattice is counted
+//! in this `t`, so that it does not depend on where an orthographic camera stands.
+
+use glam::{DAffine3, DMat4, DVec3, DVec4};
+use thiserror::Error;
+
+use crate::{Aabb, Viewport};
+
+/// How the view is projected.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Projection {
+    /// Perspective with a vertical field of view in degrees.
+    Perspective {
+        /// Full vertical angle in degrees, above 0 and below 180.
+        fov_y: f64,
+    },
+    /// Orthographic with the height of the view in world units.
+    Orthographic {
+        /// Height in world units.
+        height: f64,
+    },
+}
+
+/// The clip-space depth that a projection matrix maps near and far to.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum DepthRange {
+    /// 0 at near, 1 at far (wgpu, Vulkan, Direct3D).
+    #[default]
+    ZeroToOne,
+    /// −1 at near, 1 at far (OpenGL).
+    MinusOneToOne,
+}
+
+/// A camera.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Camera {
+    /// An eye that looks at a point.
+    LookAt {
+        /// Position of the eye.
+        eye: DVec3,
+        /// The point in the middle of the picture.
+        target: DVec3,
+        /// What points up in the picture.
+        up: DVec3,
+        /// The projection.
+        projection: Projection,
+        /// Distance of the near plane along the view axis from the eye.
+        near: f64,
+        /// Distance of the far plane along the view axis from the eye; may be infinite.
+        far: f64,
+    },
+    /// Any view and projection matrices, off-axis ones included; y up in clip space.
+    Matrices {
+        /// World to view space.
+        view: DMat4,
+        /// View to clip space.
+        projection: DMat4,
+        /// What near and far map to.
+        depth: DepthRange,
+    },
+}
+
+/// A ray with the interval that the camera sees of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ray {
+    /// The point at `t = 0`.
+    pub origin: DVec3,
+    /// Unit direction.
+    pub direction: DVec3,
+    /// Where the near plane is met.
+    pub near: f64,
+    /// Where the far plane is met; may be infinite.
+    pub far: f64,
+    /// `t` of the point from which depth is counted: the eye, or its plane.
+    pub depth_zero: f64,
+}
+
+impl Ray {
+    /// The point at `t`.
+    pub fn at(&self, t: f64) -> DVec3 {
+        self.origin + self.direction * t
+    }
+}
+
+/// Why a camera cannot be used.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[error("camera: {what} is {found}, wanted {wanted}")]
+pub struct CameraError {
+    /// Which part.
+    pub what: &'static str,
+    /// What was found.
+    pub found: String,
+    /// What was wanted.
+    pub wanted: &'static str,
+}
+
+/// Views that fit a scene. The z axis is up; `Front` looks along +y, as at a patient in LPS.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[expect(missing_docs, reason = "the names say it")]
+pub enum View {
+    #[default]
+    Front,
+    Back,
+    Left,
+    Right,
+    Top,
+    Bottom,
+    /// From in front, the right and above.
+    Iso,
+}
+
+impl View {
+    /// All views with their names.
+    pub const ALL: [(&'static str, Self); 7] = [
+        ("front", Self::Front),
+        ("back", Self::Back),
+        ("left", Self::Left),
+        ("right", Self::Right),
+        ("top", Self::Top),
+        ("bottom", Self::Bottom),
+        ("iso", Self::Iso),
+    ];
+
+    /// The view of that name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.iter().find(|(n, _)| *n == name).map(|(_, v)| *v)
+    }
+
+    /// The direction from the scene to the eye, and what is up.
+    pub fn axes(self) -> (DVec3, DVec3) {
+        match self {
+            Self::Front => (-DVec3::Y, DVec3::Z),
+            Self::Back => (DVec3::Y, DVec3::Z),
+            Self::Left => (-DVec3::X, DVec3::Z),
+            Self::Right => (DVec3::X, DVec3::Z),
+            Self::Top => (DVec3::Z, DVec3::Y),
+            Self::Bottom => (-DVec3::Z, DVec3::Y),
+            Self::Iso => (DVec3::new(0.62, -1.0, 0.55).normalize(), DVec3::Z),
+        }
+    }
+}
+
+impl Camera {
+    /// A perspective camera without near or far plane.
+    pub fn perspective(eye: DVec3, target: DVec3, up: DVec3, fov_y: f64) -> Self {
+        let projection = Projection::Perspective { fov_y };
+        Self::LookAt { eye, target, up, projection, near: 0.0, far: f64::INFINITY }
+    }
+
+    /// An orthographic camera that sees everything before its eye's plane.
+    pub fn orthographic(eye: DVec3, target: DVec3, up: DVec3, height: f64) -> Self {
+        let projection = Projection::Orthographic { height };
+        Self::LookAt { eye, target, up, projection, near: 0.0, far: f64::INFINITY }
+    }
+
+    /// A perspective camera (30 degrees) that sees the whole of a world box.
+    pub fn fit(bounds: &Aabb, view: View, width: usize, height: usize) -> Self {
+        let (towards_eye, up) = view.axes();
+        let fov_y: f64 = 30.0;
+        let right = up.cross(towards_eye).normalize();
+        let true_up = towards_eye.cross(right);
+        let half = (fov_y / 2.0).to_radians().tan();
+        let aspect = width.max(1) as f64 / height.max(1) as f64;
+        let center = bounds.center();
+        let size = bounds.size().length();
+        // The smallest distance at which every corner lies within 94 % of the picture.
+        let mut distance = size * 1e-3;
+        for corner in bounds.corners() {
+            let p = corner - center;
+            let (x, y, z) = (p.dot(right).abs(), p.dot(true_up).abs(), p.dot(towards_eye));
+            distance = distance.max(z + (x / aspect).max(y) / (half * 0.94));
+        }
+        Self::perspective(center + towards_eye * distance, center, true_up, fov_y)
+    }
+
+    /// Prepares the rays of a picture whose viewport is that many pixels.
+    ///
+    /// # Errors
+    /// If a number is not finite, the eye sits on its target, `up` is parallel to the view, the
+    /// field of view or height is out of bounds, near is not below far, or a matrix is singular.
+    pub fn rays(&self, viewport: &Viewport) -> Result<RayGrid, CameraError> {
+        match *self {
+            Self::LookAt { eye, target, up, projection, near, far } => {
+                look_at(eye, target, up, projection, [near, far], viewport)
+            }
+            Self::Matrices { view, projection, depth } => matrices(view, projection, depth, viewport),
+        }
+    }
+
+    /// World to clip space for a viewport: x and y in −1 to 1, y up, depth 0 to 1 for near to
+    /// far (far infinite: reversed is not used; depth tends to 1).
+    ///
+    /// # Errors
+    /// As [`rays`](Self::rays).
+    pub fn world_to_view(&self, viewport: &Viewport) -> Result<DAffine3, CameraError> {
+        let grid = self.rays(viewport)?;
+        Ok(grid.world_to_view())
+    }
+}
+
+/// All rays of a picture.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RayGrid {
+    kind: GridKind,
+    /// Points on the image plane: `corner + x·dx + y·dy` for pixel coordinates.
+    corner: DVec3,
+    dx: DVec3,
+    dy: DVec3,
+    /// Normal of the near and far planes, and their offsets: inside is `near ≤ n·p ≤ far`.
+    axis: DVec3,
+    near: f64,
+    far: f64,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum GridKind {
+    /// Rays leave the eye; the image plane is given relative to it.
+    Perspective { eye: DVec3 },
+    /// Rays share a unit direction; `zero` is the depth's zero along it.
+    Parallel { direction: DVec3, zero: f64 },
+}
+
+impl RayGrid {
+    /// Whether the rays meet in an eye, and where.
+    pub fn eye(&self) -> Option<DVec3> {
+        match self.kind {
+            GridKind::Perspective { eye } => Some(eye),
+            GridKind::Parallel { .. } => None,
+        }
+    }
+
+    /// The view axis: normal of near and far planes, pointing away from the eye.
+    pub fn axis(&self) -> DVec3 {
+        self.axis
+    }
+
+    /// The ray through a point of the viewport in pixels; pixel (x, y) has its centre at +0.5.
+    pub fn ray(&self, x: f64, y: f64) -> Ray {
+        let plane = self.corner + self.dx * x + self.dy * y;
+        match self.kind {
+            GridKind::Perspective { eye } => {
+                let direction = plane.normalize();
+                let (slope, start) = (self.axis.dot(direction), self.axis.dot(eye));
+                let [near, far] = self.clip(slope, start);
+                Ray { origin: eye, direction, near: near.max(0.0), far, depth_zero: 0.0 }
+            }
+            GridKind::Parallel { direction, zero } => {
+                let origin = plane - direction * plane.dot(direction);
+                let [near, far] = self.clip(self.axis.dot(direction), self.axis.dot(origin));
+                Ray { origin, direction, near, far, depth_zero: zero }
+            }
+        }
+    }
+
+    fn clip(&self, slope: f64, start: f64) -> [f64; 2] {
+        let at = |plane: f64| if plane.is_finite() { (plane - start) / slope } else { plane };
+        [at(self.near), at(self.far)]
+    }
+
+    fn world_to_view(&self) -> DAffine3 {
+        let forward = self.axis;
+        let up = -self.dy.normalize();
+        let right = forward.cross(up).normalize();
+        let up = right.cross(forward);
+        let rotation = glam::DMat3::from_cols(right, up, -forward).transpose();
+        let eye = self.eye().unwrap_or(self.corner);
+        DAffine3::from_mat3_translation(rotation, -(rotation * eye))
+    }
+}
+
+fn error(what: &'static str, found: impl ToString, wanted: &'static str) -> CameraError {
+    CameraError { what, found: found.to_string(), wanted }
+}
+
+fn look_at(
+    eye: DVec3,
+    target: DVec3,
+    up: DVec3,
+    projection: Projection,
+    [near, far]: [f64; 2],
+    viewport: &Viewport,
+) -> Result<RayGrid, CameraError> {
+    for (what, v) in [("eye", eye), ("target", target), ("up", up)] {
+        if !v.is_finite() {
+            return Err(error(what, v, "finite numbers"));
+        }
+    }
+    let forward = (target - eye).try_normalize().ok_or_else(|| error("target", target, "a point off the eye"))?;
+    let side = up.try_normalize().map(|up| forward.cross(up)).filter(|s| s.length() > 1e-12);
+    let right = side.ok_or_else(|| error("up", up, "a direction off the view axis"))?.normalize();
+    let up = right.cross(forward);
+    if near.is_nan() || far.is_nan() || near >= far || near == f64::INFINITY {
+        return Err(error("near and far", format!("{near} and {far}"), "near below far"));
+    }
+    let (w, h) = (viewport.width as f64, viewport.height as f64);
+    let start = forward.dot(eye);
+    let grid = |kind, center: DVec3, half: f64| RayGrid {
+        kind,
+        corner: center - right * (half * w / h) + up * half,
+        dx: right * (2.0 * half / h),
+        dy: -up * (2.0 * half / h),
+        axis: forward,
+        near: start + near,
+        far: start + far,
+    };
+    match projection {
+        Projection::Perspective { fov_y } => {
+            if !(fov_y > 0.0 && fov_y < 180.0) {
+                return Err(error("field of view", fov_y, "above 0 and below 180 degrees"));
+            }
+            if near < 0.0 {
+                return Err(error("near", near, "at least 0"));
+            }
+            let half = (fov_y / 2.0).to_radians().tan();
+            Ok(grid(GridKind::Perspective { eye }, forward, half))
+        }
+        Projection::Orthographic { height } => {
+            if !(height > 0.0 && height.is_finite()) {
+                return Err(error("height", height, "a positive, finite number"));
+            }
+            let kind = GridKind::Parallel { direction: forward, zero: start };
+            Ok(grid(kind, eye, height / 2.0))
+        }
+    }
+}
+
+fn matrices(view: DMat4, projection: DMat4, depth: DepthRange, viewport: &Viewport) -> Result<RayGrid, CameraError> {
+    if !view.is_finite() || !projection.is_finite() {
+        return Err(error("matrix", "not finite", "finite numbers"));
+    }
+    let inverse = (projection * view).inverse();
+    if !inverse.is_finite() {
+        return Err(error("matrix", "singular", "invertible view and projection"));
+    }
+    let near_depth = if depth == DepthRange::ZeroToOne { 0.0 } else { -1.0 };
+    let point = |x: f64, y: f64, z: f64| {
+        let p = inverse * DVec4::new(x, y, z, 1.0);
+        p.truncate() / p.w
+    };
+    let (w, h) = (viewport.width as f64, viewport.height as f64);
+    // The one point, finite or not, through which all rays pass.
+    let apex = inverse * DVec4::new(0.0, 0.0, 1.0, 0.0);
+    let corner = [point(-1.0, 1.0, near_depth), point(1.0, 1.0, near_depth), point(-1.0, -1.0, near_depth)];
+    if corner.iter().any(|c| !c.is_finite()) {
+        return Err(error("projection", "a near plane at infinity", "a finite near plane"));
+    }
+    let axis_raw = (corner[2] - corner[0]).cross(corner[1] - corner[0]);
+    let axis =
+        axis_raw.try_normalize().ok_or_else(|| error("projection", "a view without area", "an invertible matrix"))?;
+    let far_h = inverse * DVec4::new(0.0, 0.0, 1.0, 1.0);
+    let finite_apex = apex.w.abs() > 1e-12 * apex.truncate().length().max(1e-300);
+    let inner = point(0.0, 0.0, if depth == DepthRange::ZeroToOne { 0.5 } else { 0.0 });
+    let middle = point(0.0, 0.0, near_depth);
+    let axis = if axis.dot(inner - middle) < 0.0 { -axis } else { axis };
+    let far_point = far_h.truncate() / far_h.w;
+    let far = axis.dot(far_point);
+    let near = axis.dot(corner[0]);
+    let far = if far.is_finite() && far > near { far } else { f64::INFINITY };
+    let (dx, dy) = ((corner[1] - corner[0]) / w, (corner[2] - corner[0]) / h);
+    let (kind, origin) = if finite_apex {
+        let eye = apex.truncate() / apex.w;
+        (GridKind::Perspective { eye }, corner[0] - eye)
+    } else {
+        let direction = (inner - middle).normalize();
+        (GridKind::Parallel { direction, zero: direction.dot(middle) }, corner[0])
+    };
+    Ok(RayGrid { kind, corner: origin, dx, dy, axis, near, far })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn viewport(width: usize, height: usize) -> Viewport {
+        Viewport { x: 0, y: 0, width, height }
+    }
+
+    #[test]
+    fn row_zero_is_at_the_top_and_x_runs_right() {
+        let camera = Camera::perspective(DVec3::new(0.0, -5.0, 0.0), DVec3::ZERO, DVec3::Z, 90.0);
+        let rays = camera.rays(&viewport(2, 2)).unwrap();
+        let ray = rays.ray(0.5, 0.5);
+        assert!(ray.direction.x < 0.0 && ray.direction.z > 0.0);
+        let at_plane = ray.at(5.0 / ray.direction.y);
+        assert!((at_plane - DVec3::new(-2.5, 0.0, 2.5)).length() < 1e-12);
+    }
+
+    #[test]
+    fn orthographic_lattice_does_not_depend_on_the_eye() {
+        let at = |d: f64| {
+            let camera = Camera::orthographic(DVec3::new(1.0, -d, 2.0), DVec3::new(1.0, 0.0, 2.0), DVec3::Z, 4.0);
+            camera.rays(&viewport(8, 8)).unwrap().ray(1.5, 2.5)
+        };
+        let (a, b) = (at(5.0), at(9.0));
+        assert!((a.origin - b.origin).length() < 1e-12);
+        assert!(a.origin.y.abs() < 1e-12);
+        assert_eq!((a.near, b.near), (-5.0, -9.0));
+    }
+
+    fn compare(look: Camera, matrices: Camera) -> Result<(), TestCaseError> {
+        let view = viewport(37, 23);
+        let (a, b) = (look.rays(&view).unwrap(), matrices.rays(&view).unwrap());
+        for (x, y) in [(0.5, 0.5), (36.5, 0.5), (12.5, 20.5)] {
+            let (p, q) = (a.ray(x, y), b.ray(x, y));
+            prop_assert!((p.direction - q.direction).length() < 1e-9, "{p:?} {q:?}");
+            prop_assert!((p.origin - q.origin).length() < 1e-6);
+            prop_assert!((p.near - q.near).abs() < 1e-6 && (p.far - q.far).abs() < 1e-4 * p.far.abs());
+        }
+        Ok(())
+    }
+
+    proptest! {
+        #[test]
+        fn matrices_give_the_same_rays_as_look_at(
+            eye in prop::array::uniform3(-10.0..10.0f64),
+            fov in 5.0..150.0f64,
+            ortho in any::<bool>(),
+        ) {
+            let eye = DVec3::from_array(eye) + DVec3::new(0.0, -20.0, 0.0);
+            let (near, far, aspect) = (0.5, 80.0, 37.0 / 23.0);
+            let view = DMat4::from_cols_array(&glam::DMat4::look_at_rh(eye, DVec3::ZERO, DVec3::Z).to_cols_array());
+            let height = fov / 5.0;
+            let (projection, kind) = if ortho {
+                let (w, h) = (height * aspect / 2.0, height / 2.0);
+                (DMat4::orthographic_rh(-w, w, -h, h, near, far), Projection::Orthographic { height })
+            } else {
+                (DMat4::perspective_rh(fov.to_radians(), aspect, near, far), Projection::Perspective { fov_y: fov })
+            };
+            let look = Camera::LookAt { eye, target: DVec3::ZERO, up: DVec3::Z, projection: kind, near, far };
+            compare(look, Camera::Matrices { view, projection, depth: DepthRange::ZeroToOne })?;
+        }
+
+        #[test]
+        fn fit_sees_every_corner(
+            min in prop::array::uniform3(-10.0..10.0f64),
+            size in prop::array::uniform3(0.1..30.0f64),
+            view in 0usize..7,
+            width in 20usize..200,
+        ) {
+            let min = DVec3::from_array(min);
+            let bounds = Aabb::new(min, min + DVec3::from_array(size));
+            let camera = Camera::fit(&bounds, View::ALL[view].1, width, 64);
+            let rays = camera.rays(&viewport(width, 64)).unwrap();
+            let to_view = rays.world_to_view();
+            let corner = rays.ray(0.0, 0.0).direction;
+            let limit = to_view.transform_vector3(corner);
+            for c in bounds.corners() {
+                let p = to_view.transform_point3(c);
+                prop_assert!(p.z < 0.0);
+                prop_assert!((p.x / p.z).abs() <= (limit.x / limit.z).abs());
+                prop_assert!((p.y / p.z).abs() <= (limit.y / limit.z).abs());
+            }
+        }
+    }
+
+    #[test]
+    fn bad_cameras_are_refused() {
+        let bad = |camera: Camera| camera.rays(&viewport(4, 4)).unwrap_err().to_string();
+        let (eye, target) = (DVec3::Y, DVec3::ZERO);
+        assert!(bad(Camera::perspective(eye, eye, DVec3::Z, 30.0)).contains("a point off the eye"));
+        assert!(bad(Camera::perspective(eye, target, DVec3::Y, 30.0)).contains("up is"));
+        assert!(bad(Camera::perspective(eye, target, DVec3::Z, 180.0)).contains("field of view is 180"));
+        assert!(bad(Camera::orthographic(eye, target, DVec3::Z, 0.0)).contains("height is 0"));
+        let zero = Camera::Matrices { view: DMat4::IDENTITY, projection: DMat4::ZERO, depth: DepthRange::default() };
+        assert!(bad(zero).contains("singular"));
+    }
+}

@@ -1,0 +1,42 @@
+//! The core of Volact: *what* to draw, and the contract of those who draw it.
+//!
+//! A [`Shape`] is a [`Geometry`], an [`Appearance`] and an affine transform. A
+//! [`RenderAction`] draws shapes into a [`Frame`]. Actions, shaders, geometries and loaders are
+//! found by name in a [`Registry`], each with its [`Declaration`].
+//!
+//! This crate knows no backend, no GPU and no file format; everything else depends on it.
+
+pub mod action;
+pub mod bulk;
+pub mod camera;
+pub mod checked;
+pub mod frame;
+pub mod geometry;
+pub mod lattice;
+pub mod lifecycle;
+pub mod loader;
+pub mod names;
+pub mod null;
+pub mod parameter;
+pub mod registry;
+pub mod resolve;
+pub mod shader;
+pub mod shape;
+pub mod table;
+pub mod volume;
+pub mod warning;
+
+pub use action::{ActionError, Caps, Context, Options, RenderAction};
+pub use bulk::{Buffer, Bulk};
+pub use camera::{Camera, Projection, Ray, RayGrid, View};
+pub use frame::{Frame, FrameDesc, Method, Statistics, Viewport};
+pub use geometry::{Aabb, Block, Geometry, Tessellation};
+pub use glam;
+pub use loader::{LoadError, LoadOptions, Loader, Progress, Region, VolumeReader};
+pub use parameter::{Declaration, ParameterDecl, ParameterType, ParameterValue};
+pub use registry::Registry;
+pub use shader::{Compositing, ShaderEntry};
+pub use shape::{Appearance, Shape};
+pub use table::{ControlPoint, LookupTable, TableInterpolation};
+pub use volume::{Filter, Roi, ScalarType, Volume, VolumeDesc, VolumeTexture};
+pub use warning::{Severity, Warning, WarningCode};

@@ -1,0 +1,272 @@
+//! The registry: names → factories with their declarations. Built-ins and plugins register alike.
+
+use std::{collections::BTreeMap, fmt, path::Path, sync::Arc};
+
+use thiserror::Error;
+
+use crate::{
+    ActionError, Block, Context, Declaration, Geometry, LoadError, LoadOptions, Loader, Options, ParameterDecl,
+    ParameterType, ParameterValue, Progress, RenderAction, ShaderEntry, Volume,
+    checked::{self, CheckedAction},
+    geometry::GeometryError,
+    loader::{self, NoProgress},
+    null::{self, NullAction},
+    parameter::{Kind, ParameterMap},
+    shader::{self, ShaderCatalog},
+};
+
+/// Makes an action from its options, which are checked and have their defaults filled in.
+pub type ActionFactory = Arc<dyn Fn(&Context, &Options) -> Result<Box<dyn RenderAction>, ActionError> + Send + Sync>;
+
+/// Makes a geometry from its parameters, which are checked and have their defaults filled in.
+pub type GeometryFactory = Arc<dyn Fn(&ParameterMap) -> Result<Arc<dyn Geometry>, GeometryError> + Send + Sync>;
+
+/// Why something cannot be registered.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[non_exhaustive]
+pub enum RegisterError {
+    /// The name is taken.
+    #[error("{kind} {name:?} is registered already (version {version})")]
+    Taken {
+        /// What it is.
+        kind: &'static str,
+        /// The name.
+        name: String,
+        /// The version that is there.
+        version: String,
+    },
+    /// The name cannot be used.
+    #[error("{kind} name is {name:?}, wanted lower-case letters, digits, '_' and '-', starting with a letter")]
+    Name {
+        /// What it is.
+        kind: &'static str,
+        /// The name.
+        name: String,
+    },
+}
+
+/// All that is known by name.
+#[derive(Clone, Default)]
+pub struct Registry {
+    actions: BTreeMap<String, (Declaration, ActionFactory)>,
+    geometries: BTreeMap<String, (Declaration, GeometryFactory)>,
+    loaders: Vec<Arc<dyn Loader>>,
+    shaders: ShaderCatalog,
+}
+
+impl Registry {
+    /// A registry that knows nothing.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// What this crate itself offers: the `null` and `checked` actions, the `block` geometry, and
+    /// the declarations of the shaders.
+    pub fn with_core() -> Self {
+        let mut registry = Self::new();
+        registry.register_core().expect("the names of an empty registry are free");
+        registry
+    }
+
+    fn register_core(&mut self) -> Result<(), RegisterError> {
+        self.add_action(null::declaration(), Arc::new(|context, _| Ok(Box::new(NullAction::new(context)))))?;
+        // `checked` is made by `action`, which can look up what it wraps.
+        self.add_action(checked::declaration(), Arc::new(|context, _| Ok(Box::new(NullAction::new(context)))))?;
+        self.add_geometry(block_declaration(), Arc::new(make_block))?;
+        shader::builtin().into_iter().try_for_each(|entry| self.add_shader(entry))
+    }
+
+    /// Registers an action.
+    ///
+    /// # Errors
+    /// If the name is taken or cannot be used; so for the other kinds.
+    pub fn add_action(&mut self, declaration: Declaration, factory: ActionFactory) -> Result<(), RegisterError> {
+        let taken = self.actions.get(&declaration.name).map(|(d, _)| d);
+        check_name(&declaration, Kind::Action, taken)?;
+        self.actions.insert(declaration.name.clone(), (declaration, factory));
+        Ok(())
+    }
+
+    /// Registers a geometry.
+    ///
+    /// # Errors
+    /// As [`add_action`](Self::add_action).
+    pub fn add_geometry(&mut self, declaration: Declaration, factory: GeometryFactory) -> Result<(), RegisterError> {
+        let taken = self.geometries.get(&declaration.name).map(|(d, _)| d);
+        check_name(&declaration, Kind::Geometry, taken)?;
+        self.geometries.insert(declaration.name.clone(), (declaration, factory));
+        Ok(())
+    }
+
+    /// Registers a loader.
+    ///
+    /// # Errors
+    /// As [`add_action`](Self::add_action).
+    pub fn add_loader(&mut self, loader: Arc<dyn Loader>) -> Result<(), RegisterError> {
+        let name = &loader.declaration().name;
+        let taken = self.loaders.iter().map(|l| l.declaration()).find(|d| d.name == *name);
+        check_name(loader.declaration(), Kind::Loader, taken)?;
+        self.loaders.push(loader);
+        Ok(())
+    }
+
+    /// Registers a shader.
+    ///
+    /// # Errors
+    /// As [`add_action`](Self::add_action).
+    pub fn add_shader(&mut self, entry: ShaderEntry) -> Result<(), RegisterError> {
+        let taken = self.shaders.get(&entry.declaration.name).map(|s| &s.declaration);
+        check_name(&entry.declaration, Kind::Shader, taken)?;
+        self.shaders.insert(entry);
+        Ok(())
+    }
+
+    /// All declarations, by kind and name.
+    pub fn declarations(&self) -> Vec<&Declaration> {
+        let actions = self.actions.values().map(|(d, _)| d);
+        let shaders = self.shaders.iter().map(|s| &s.declaration);
+        let geometries = self.geometries.values().map(|(d, _)| d);
+        let loaders = self.loaders.iter().map(|l| l.declaration());
+        let mut all: Vec<_> = actions.chain(shaders).chain(geometries).chain(loaders).collect();
+        all.sort_by(|a, b| (a.kind, &a.name).cmp(&(b.kind, &b.name)));
+        all
+    }
+
+    /// The shaders.
+    pub fn shaders(&self) -> &ShaderCatalog {
+        &self.shaders
+    }
+
+    /// The loaders.
+    pub fn loaders(&self) -> &[Arc<dyn Loader>] {
+        &self.loaders
+    }
+
+    /// The names of all actions.
+    pub fn action_names(&self) -> impl Iterator<Item = &str> {
+        self.actions.keys().map(String::as_str)
+    }
+
+    /// Makes an action.
+    ///
+    /// # Errors
+    /// If nobody registered the name, options are wrong, or the action cannot run here.
+    pub fn action(&self, name: &str, options: &Options) -> Result<Box<dyn RenderAction>, ActionError> {
+        let (declaration, factory) = self.actions.get(name).ok_or_else(|| self.unknown_action(name))?;
+        let context = Context { shaders: self.shaders.clone() };
+        if name == "checked" {
+            let mut inner = options.clone();
+            let of = match inner.remove("of") {
+                Some(ParameterValue::Choice(of)) => of,
+                _ => "cpu".to_owned(),
+            };
+            if of == "checked" {
+                return Err(self.unknown_action("checked of checked"));
+            }
+            return Ok(Box::new(CheckedAction::new(&context, self.action(&of, &inner)?)));
+        }
+        let options = declaration
+            .resolve(options, |_| false)
+            .map_err(|problems| ActionError::Options { action: name.into(), problems })?;
+        log::debug!("action {name} {} with {options:?}", declaration.version);
+        factory(&context, &options)
+    }
+
+    /// Makes a geometry.
+    ///
+    /// # Errors
+    /// If nobody registered the name, or parameters are wrong.
+    pub fn geometry(&self, name: &str, parameters: &ParameterMap) -> Result<Arc<dyn Geometry>, GeometryError> {
+        let invalid = |what: String, found: String, wanted: String| GeometryError::Invalid {
+            geometry: name.into(),
+            what,
+            found,
+            wanted,
+        };
+        let Some((declaration, factory)) = self.geometries.get(name) else {
+            let known: Vec<_> = self.geometries.keys().map(String::as_str).collect();
+            let hint = crate::names::hint(name, known.iter().copied());
+            return Err(invalid("name".into(), "unknown".into(), format!("one of {}{hint}", known.join(", "))));
+        };
+        let parameters = declaration.resolve(parameters, |_| false).map_err(|problems| {
+            invalid("description".into(), "wrong".into(), format!("no problems: {}", shader::join(&problems)))
+        })?;
+        factory(&parameters)
+    }
+
+    /// Reads a volume: the loader is chosen by content before extension.
+    ///
+    /// # Errors
+    /// If the file cannot be read, is damaged, or no loader knows it.
+    pub fn load(&self, path: impl AsRef<Path>) -> Result<Volume, LoadError> {
+        self.load_with(path, None, &LoadOptions::new(), &NoProgress)
+    }
+
+    /// Reads a volume with a named loader, options and progress.
+    ///
+    /// # Errors
+    /// As [`load`](Self::load), and if no loader has that name or options are wrong.
+    pub fn load_with(
+        &self,
+        path: impl AsRef<Path>,
+        loader: Option<&str>,
+        options: &LoadOptions,
+        progress: &dyn Progress,
+    ) -> Result<Volume, LoadError> {
+        let path = path.as_ref();
+        let loader = match loader {
+            Some(name) => self.loader(name)?,
+            None => loader::choose(&self.loaders, path)?,
+        };
+        log::debug!("{}: read by loader {}", path.display(), loader.declaration().name);
+        loader::load(loader.as_ref(), path, options, progress)
+    }
+
+    fn loader(&self, name: &str) -> Result<&Arc<dyn Loader>, LoadError> {
+        let names: Vec<_> = self.loaders.iter().map(|l| l.declaration().name.as_str()).collect();
+        self.loaders.iter().find(|l| l.declaration().name == name).ok_or_else(|| LoadError::UnknownLoader {
+            name: name.into(),
+            hint: crate::names::hint(name, names.iter().copied()),
+            known: names.join(", "),
+        })
+    }
+
+    fn unknown_action(&self, name: &str) -> ActionError {
+        let known: Vec<_> = self.action_names().collect();
+        let hint = crate::names::hint(name, known.iter().copied());
+        ActionError::UnknownAction { name: name.into(), hint, known: known.join(", ") }
+    }
+}
+
+impl fmt::Debug for Registry {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_list().entries(self.declarations().iter().map(|d| (d.kind.name(), &d.name))).finish()
+    }
+}
+
+fn check_name(declaration: &Declaration, kind: Kind, taken: Option<&Declaration>) -> Result<(), RegisterError> {
+    let name = declaration.name.clone();
+    let allowed = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_' || c == '-';
+    if !name.starts_with(|c: char| c.is_ascii_lowercase()) || !name.chars().all(allowed) {
+        return Err(RegisterError::Name { kind: kind.name(), name });
+    }
+    match taken {
+        Some(there) => Err(RegisterError::Taken { kind: kind.name(), name, version: there.version.clone() }),
+        None => Ok(()),
+    }
+}
+
+fn block_declaration() -> Declaration {
+    let vec3 = |name, text| ParameterDecl::new(name, ParameterType::Vec3, text).unit("object units").required();
+    Declaration::new(Kind::Geometry, "block", env!("CARGO_PKG_VERSION"), "a box along the axes of object space")
+        .with(vec3("offset", "its lowest corner"))
+        .with(vec3("dimensions", "its lengths"))
+}
+
+fn make_block(parameters: &ParameterMap) -> Result<Arc<dyn Geometry>, GeometryError> {
+    let vec3 = |name: &str| match parameters.get(name) {
+        Some(ParameterValue::Vec3(v)) => *v,
+        _ => glam::DVec3::NAN,
+    };
+    Ok(Arc::new(Block::new(vec3("offset"), vec3("dimensions"))?))
+}

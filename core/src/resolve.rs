@@ -1,0 +1,128 @@
+//! Shapes with everything looked up and checked, as actions draw them.
+
+use glam::DAffine3;
+
+use crate::{
+    Aabb, ActionError, Compositing, LookupTable, ParameterValue, ShaderEntry, Shape, VolumeTexture, Warning,
+    WarningCode,
+    parameter::{ParameterMap, ParameterProblem, ProblemKind},
+    shader::ShaderCatalog,
+    shape::ShapeState,
+};
+use std::sync::Arc;
+
+/// A shape at the moment of `begin_draw`: shader found, parameters checked, defaults filled in.
+#[derive(Clone, Debug)]
+pub struct ResolvedShape {
+    /// The shape's identity.
+    pub id: u64,
+    /// The shape's name.
+    pub name: String,
+    /// Its state.
+    pub state: ShapeState,
+    /// Its shader.
+    pub shader: Arc<ShaderEntry>,
+    /// Parameters as the shader declares them, defaults filled in.
+    pub parameters: ParameterMap,
+    /// World space to object space.
+    pub to_object: DAffine3,
+    /// Warnings about it.
+    pub warnings: Vec<Warning>,
+}
+
+impl ResolvedShape {
+    /// Looks everything up.
+    ///
+    /// # Errors
+    /// If shader, parameters or transform are wrong; all problems of the parameters at once.
+    pub fn new(shape: &Shape, shaders: &ShaderCatalog) -> Result<Self, ActionError> {
+        let state = shape.state();
+        let name = shape.name().to_owned();
+        let shader = shaders.get(&state.shader).ok_or_else(|| ActionError::UnknownShader {
+            shape: name.clone(),
+            shader: state.shader.clone(),
+            hint: crate::names::hint(&state.shader, shaders.iter().map(|s| s.declaration.name.as_str())),
+            known: shaders.iter().map(|s| s.declaration.name.as_str()).collect::<Vec<_>>().join(", "),
+        })?;
+        let shader = Arc::clone(shader);
+        let parameters = shader.declaration.resolve(&state.parameters, |n| shaders.declares(n));
+        let parameters = parameters.map_err(|mut problems| {
+            improve_hints(&mut problems, &shader, shaders);
+            ActionError::Parameters { shape: name.clone(), shader: state.shader.clone(), problems }
+        })?;
+        let to_object = state.transform.inverse();
+        let finite = state.transform.is_finite() && to_object.is_finite();
+        if !finite || state.transform.matrix3.determinant() == 0.0 {
+            return Err(ActionError::Transform { shape: name, found: format!("{:?}", state.transform) });
+        }
+        let mut warnings = shape.notes().to_vec();
+        let unused = state.parameters.keys().filter(|n| {
+            // Every shape carries a unit distance; that a shader needs none is no surprise.
+            shader.declaration.parameter(n).is_none() && *n != "unit_distance"
+        });
+        warnings.extend(unused.map(|n| {
+            let message = format!("parameter {n:?} is kept but shader {:?} does not use it", state.shader);
+            Warning::new(WarningCode::UnusedParameter, &name, message)
+        }));
+        Ok(Self { id: shape.id(), name, state, shader, parameters, to_object, warnings })
+    }
+
+    /// How its samples are put together.
+    pub fn compositing(&self) -> Compositing {
+        self.shader.compositing
+    }
+
+    /// A volume parameter.
+    pub fn volume(&self, name: &str) -> Option<&VolumeTexture> {
+        match self.parameters.get(name) {
+            Some(ParameterValue::Volume(v)) => Some(v),
+            _ => None,
+        }
+    }
+
+    /// A table parameter.
+    pub fn table(&self, name: &str) -> Option<&LookupTable> {
+        match self.parameters.get(name) {
+            Some(ParameterValue::Table(t)) => Some(t),
+            _ => None,
+        }
+    }
+
+    /// A number.
+    pub fn float(&self, name: &str) -> Option<f64> {
+        self.parameters.get(name).and_then(ParameterValue::as_float)
+    }
+
+    /// A whole number.
+    pub fn int(&self, name: &str) -> Option<i64> {
+        match self.parameters.get(name) {
+            Some(ParameterValue::Int(v)) => Some(*v),
+            _ => None,
+        }
+    }
+
+    /// The box to draw in object space: the geometry's block ∩ the volume's geometry ROI; `None`
+    /// where the geometry is no block.
+    pub fn block(&self) -> Option<Aabb> {
+        let block = self.state.geometry.as_block()?;
+        Some(self.volume("volume").map_or(block, |v| block.intersection(&v.geometry_roi())))
+    }
+
+    /// Whether nothing that a picture depends on differs from an earlier resolution.
+    pub fn same_content(&self, other: &Self) -> bool {
+        let versions = |r: &Self| r.parameters.values().map(ParameterValue::content_version).collect::<Vec<_>>();
+        self.state.geometry_version == other.state.geometry_version
+            && self.state.shader == other.state.shader
+            && self.state.transform == other.state.transform
+            && self.parameters == other.parameters
+            && versions(self) == versions(other)
+    }
+}
+
+fn improve_hints(problems: &mut [ParameterProblem], shader: &ShaderEntry, shaders: &ShaderCatalog) {
+    for problem in problems {
+        if let ProblemKind::Unknown { nearest } = &mut problem.kind {
+            *nearest = shaders.nearest_parameter(shader, &problem.name);
+        }
+    }
+}

@@ -1,0 +1,146 @@
+//! Shaders: what turns a sample into colour and extinction, known by name.
+//!
+//! A [`ShaderEntry`] is the declaration and how the shader's samples are put together. Its source
+//! is not needed here: an action asks for the shaders that it knows by name.
+
+use std::{collections::BTreeMap, sync::Arc};
+
+use crate::{
+    Declaration, ParameterDecl, ParameterType,
+    parameter::{Kind, ParameterProblem},
+};
+
+/// How a shader's samples along a ray become one colour.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Compositing {
+    /// Emission and absorption in depth order.
+    Over,
+    /// The highest value of the interval, then classified.
+    Maximum,
+    /// The lowest value of the interval, then classified.
+    Minimum,
+    /// The mean value by length, then classified.
+    Average,
+    /// The line integral of the value divided by the unit distance, then classified.
+    Add,
+    /// Crossings of given values, each a surface.
+    First,
+}
+
+impl Compositing {
+    /// The word for it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Over => "over",
+            Self::Maximum => "maximum",
+            Self::Minimum => "minimum",
+            Self::Average => "average",
+            Self::Add => "add",
+            Self::First => "first",
+        }
+    }
+}
+
+/// A registered shader.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ShaderEntry {
+    /// Name and parameters.
+    pub declaration: Declaration,
+    /// How its samples are put together.
+    pub compositing: Compositing,
+}
+
+/// All shaders known, by name. Shared by reference.
+#[derive(Clone, Debug, Default)]
+pub struct ShaderCatalog(Arc<BTreeMap<String, Arc<ShaderEntry>>>);
+
+impl ShaderCatalog {
+    /// Adds a shader; `false` if the name is taken.
+    pub fn insert(&mut self, entry: ShaderEntry) -> bool {
+        let map = Arc::make_mut(&mut self.0);
+        let name = entry.declaration.name.clone();
+        if map.contains_key(&name) {
+            return false;
+        }
+        map.insert(name, Arc::new(entry));
+        true
+    }
+
+    /// The shader of that name.
+    pub fn get(&self, name: &str) -> Option<&Arc<ShaderEntry>> {
+        self.0.get(name)
+    }
+
+    /// All shaders in order of their names.
+    pub fn iter(&self) -> impl Iterator<Item = &Arc<ShaderEntry>> {
+        self.0.values()
+    }
+
+    /// Whether any shader declares a parameter of that name.
+    pub fn declares(&self, parameter: &str) -> bool {
+        self.iter().any(|s| s.declaration.parameter(parameter).is_some())
+    }
+
+    /// For a name that the shader at hand does not declare: the nearest one that it does, else
+    /// the nearest of any shader.
+    pub fn nearest_parameter(&self, shader: &ShaderEntry, name: &str) -> Option<String> {
+        let names = |s: &ShaderEntry| s.declaration.parameters.iter().map(|p| p.name.clone()).collect::<Vec<_>>();
+        let own = names(shader);
+        let all: Vec<_> = self.iter().flat_map(|s| names(s)).collect();
+        let find = |known: &[String]| crate::names::nearest(name, known.iter().map(String::as_str)).map(str::to_owned);
+        find(&own).or_else(|| find(&all))
+    }
+}
+
+/// Several problems on one line.
+pub(crate) fn join(problems: &[ParameterProblem]) -> String {
+    problems.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ")
+}
+
+/// The shaders whose meaning this crate defines: they read one volume and a table.
+pub fn builtin() -> Vec<ShaderEntry> {
+    let version = env!("CARGO_PKG_VERSION");
+    let volume = || ParameterDecl::new("volume", ParameterType::Volume, "the data").required();
+    let table = |text| ParameterDecl::new("lookup_table", ParameterType::Table, text);
+    let unit = || {
+        ParameterDecl::new(
+            "unit_distance",
+            ParameterType::Float,
+            "the world length over which opacity is the fraction absorbed; \
+             the smallest voxel spacing unless given when the shape is built",
+        )
+        .bounds(f64::MIN_POSITIVE, f64::MAX)
+        .unit("world units")
+        .required()
+    };
+    let component = || {
+        ParameterDecl::new("component", ParameterType::Int, "the component of the volume that is read")
+            .default(0i64)
+            .bounds(0.0, 3.0)
+    };
+    let entry = |name: &str, compositing, text: &str, parameters: Vec<ParameterDecl>| ShaderEntry {
+        declaration: Declaration { parameters, ..Declaration::new(Kind::Shader, name, version, text) },
+        compositing,
+    };
+    let grey = "from value to colour and opacity; by default an opaque grey ramp over the volume's range";
+    let flat =
+        |name: &str, compositing, text: &str| entry(name, compositing, text, vec![volume(), table(grey), component()]);
+    vec![
+        entry("simple", Compositing::Over, "the volume's own components as colour and opacity", vec![volume(), unit()]),
+        entry(
+            "lut",
+            Compositing::Over,
+            "a lookup table, emission and absorption",
+            vec![volume(), table("from value to colour and opacity").required(), unit(), component()],
+        ),
+        flat("mip", Compositing::Maximum, "the highest value along the ray, classified"),
+        flat("minip", Compositing::Minimum, "the lowest value along the ray, classified"),
+        flat("average", Compositing::Average, "the mean value along the ray, classified"),
+        entry(
+            "xray",
+            Compositing::Add,
+            "the line integral of the value divided by the unit distance, classified",
+            vec![volume(), table(grey), unit(), component()],
+        ),
+    ]
+}
