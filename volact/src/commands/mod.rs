@@ -1,0 +1,69 @@
+//! The subcommands, one module each.
+
+pub mod bench;
+pub mod compare;
+pub mod completions;
+pub mod describe;
+pub mod info;
+pub mod render;
+
+use std::{
+    io::Write,
+    process::ExitCode,
+    sync::atomic::{AtomicBool, Ordering},
+};
+
+use clap::Subcommand;
+
+/// What the user asks for.
+#[derive(Subcommand)]
+pub enum Command {
+    /// Draw a scene or a bare volume into a picture
+    Render(render::Args),
+    /// Say what a file holds
+    Info(info::Args),
+    /// List all actions, shaders, geometries and loaders, or describe one in full
+    Describe(describe::Args),
+    /// Compare two pictures; exits with 1 where they differ by more than a threshold
+    Compare(compare::Args),
+    /// Measure how fast a scene is drawn
+    Bench(bench::Args),
+    /// Print completions for a shell
+    Completions(completions::Args),
+}
+
+impl Command {
+    /// Does it.
+    pub fn run(self) -> anyhow::Result<ExitCode> {
+        let registry = volact::with_builtins();
+        match self {
+            Self::Render(args) => render::run(args, &registry),
+            Self::Info(args) => info::run(args, &registry),
+            Self::Describe(args) => describe::run(args, &registry),
+            Self::Compare(args) => compare::run(args, &registry),
+            Self::Bench(args) => bench::run(args, &registry),
+            Self::Completions(args) => completions::run(args, &registry),
+        }
+    }
+}
+
+static QUIET: AtomicBool = AtomicBool::new(false);
+
+/// Says whether only errors are to be printed.
+pub fn set_quiet(quiet: bool) {
+    QUIET.store(quiet, Ordering::Relaxed);
+}
+
+/// Whether only errors, and what was asked for by name, are to be printed.
+pub fn quiet() -> bool {
+    QUIET.load(Ordering::Relaxed)
+}
+
+/// Prints to standard output. That the reader has gone (`volact describe | head`) is no error.
+pub fn print(text: &str) -> anyhow::Result<()> {
+    let mut out = std::io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Err(error.into()),
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,1 @@
+//! A camera and a transfer function for a bare volume.
