@@ -256,6 +256,34 @@ pub(crate) mod tests {
         assert_eq!(compare(&image(&a, 1), &image(&a, 1)).unwrap().max, 0.0);
     }
 
+    /// scikit-image 0.26.0, `structural_similarity` with the same window, and flip-evaluator 1.7
+    /// (single precision), on the same two pictures.
+    #[test]
+    fn others_find_the_same_numbers() {
+        let [a, b] = pair(40, 32);
+        let d = compare(&image(&a, 40), &image(&b, 40)).unwrap();
+        assert!((d.max - 0.431_372_553).abs() < 1e-8);
+        assert!((d.rmse - 0.134_668_437).abs() < 1e-8);
+        assert!((d.ssim.unwrap() - 0.805_985_267_540).abs() < 1e-8);
+        assert!((d.flip - 0.390_443_742).abs() < 2e-5, "{}", d.flip);
+        assert!((d.flip_map[17 * 40 + 20] - 0.473_853_05).abs() < 1e-4);
+        assert!((d.flip_map[0] - 0.443_905_03).abs() < 1e-4);
+        assert!((d.flip_map[31 * 40 + 39] - 0.591_482_76).abs() < 1e-4);
+        let nearer = flip::map(&image(&a, 40), &image(&b, 40), 30.0);
+        let mean = nearer.iter().map(|v| f64::from(*v)).sum::<f64>() / nearer.len() as f64;
+        assert!((mean - 0.442_294_747).abs() < 2e-5, "{mean}");
+    }
+
+    /// flip-evaluator 1.7 gives 0.967392 for black and white, and 1 for the farthest hues.
+    #[test]
+    fn flip_of_flat_pictures() {
+        let flat = |rgb: [f32; 3]| vec![[rgb[0], rgb[1], rgb[2], 1.0]; 256];
+        let flip = |a, b| compare(&image(&flat(a), 16), &image(&flat(b), 16)).unwrap().flip;
+        let found = flip([0.0; 3], [1.0; 3]);
+        assert!((found - 0.967_392).abs() < 2e-5, "{found}");
+        assert!((flip([0.0, 1.0, 0.0], [0.0, 0.0, 1.0]) - 1.0).abs() < 1e-6);
+    }
+
     #[test]
     fn sizes_must_agree() {
         let a = [[0.0f32; 4]; 6];

@@ -1,1 +1,284 @@
-//! A camera and a transfer function for a bare volume.
+//! A camera and a transfer function for a bare volume, from its values alone.
+//!
+//! What surrounds the subject is found at the volume's faces and made transparent. The rest is
+//! split in two by Otsu's threshold: *soft*, warm and thin, and *dense*, the colour of bone. Each
+//! gets the extinction at which a typical line through it has a stated optical depth, so that the
+//! picture depends neither on the number of voxels nor on the size of the subject. The first
+//! values above the background are dark: a ray that grazes a surface stays among them, which
+//! draws an outline where there is no lighting.
+//!
+//! Segmentations are recognised and get a colour for each label and the nearest sample instead.
+
+mod statistics;
+
+use std::collections::BTreeSet;
+
+use volact_core::{
+    Aabb, Appearance, Camera, ControlPoint, Filter, FrameDesc, LookupTable, Shape, View, Volume, VolumeTexture,
+    glam::DVec3, shape::smallest_voxel,
+};
+
+use statistics::{Background, Histogram, Statistics};
+
+/// How to show a volume of which nothing else is known.
+#[derive(Clone, Debug)]
+pub struct Automatic {
+    /// The shader: `lut`, or `simple` for volumes that bring colour or opacity.
+    pub shader: String,
+    /// The table for `lut`; `None` for `simple`.
+    pub table: Option<LookupTable>,
+    /// From where to look.
+    pub view: View,
+    /// The world box of what can be seen, which a camera should fit.
+    pub subject: Aabb,
+    /// How to interpolate.
+    pub filter: Filter,
+    /// What was found and chosen, in words.
+    pub notes: Vec<String>,
+}
+
+impl Automatic {
+    /// The volume as a texture with the filter chosen.
+    pub fn texture(&self, volume: &Volume) -> VolumeTexture {
+        VolumeTexture::new(volume).with_filter(self.filter)
+    }
+
+    /// Shader and table.
+    pub fn appearance(&self) -> Appearance {
+        let appearance = Appearance::new(&self.shader);
+        match &self.table {
+            Some(table) => appearance.with("lookup_table", table.clone()),
+            None => appearance,
+        }
+    }
+
+    /// A picture over black of the subject from where it is seen best.
+    pub fn frame(&self, width: usize, height: usize) -> FrameDesc {
+        self.frame_from(self.view, width, height)
+    }
+
+    /// A picture over black of the subject from a view of one's own.
+    pub fn frame_from(&self, view: View, width: usize, height: usize) -> FrameDesc {
+        FrameDesc::new(Camera::fit(&self.subject, view, width, height), width, height)
+    }
+
+    /// The volume as a shape that looks so.
+    pub fn shape(&self, volume: &Volume) -> Shape {
+        Shape::around_texture(&self.texture(volume), self.appearance())
+    }
+}
+
+/// Chooses appearance and view for a volume. Looks at a regular part of at most some million
+/// voxels; the same volume gets the same answer.
+pub fn automatic(volume: &Volume) -> Automatic {
+    let components = volume.desc().components;
+    if components > 1 {
+        let note = format!("{components} components: shown as the colour and opacity that they are");
+        let shader = "simple".into();
+        let subject = whole(volume);
+        return Automatic { shader, table: None, view: View::Iso, subject, filter: Filter::Linear, notes: vec![note] };
+    }
+    let statistics = Statistics::new(volume, 0);
+    let mut notes = Vec::new();
+    if let Some(padding) = statistics.padding {
+        notes.push(format!("{padding} taken as padding"));
+    }
+    if statistics.percentile(0.0) == statistics.percentile(1.0) {
+        return constant(volume, &statistics, notes);
+    }
+    match statistics.labels() {
+        Some(labels) => segmentation(volume, &statistics, &labels, notes),
+        None => intensity(volume, &statistics, notes),
+    }
+}
+
+/// A volume that is the same everywhere: a faint box.
+fn constant(volume: &Volume, statistics: &Statistics, mut notes: Vec<String>) -> Automatic {
+    let value = statistics.percentile(0.0);
+    notes.push(match statistics.sorted.is_empty() {
+        true => "no finite value: nothing to see".into(),
+        false => format!("{value} everywhere: a faint box"),
+    });
+    let longest = statistics.dims.into_iter().max().unwrap_or(1) * statistics.stride;
+    let table = table(vec![point(value, [0.5, 0.6, 0.7], opacity(0.5, longest as f64))]);
+    let subject = whole(volume);
+    Automatic { shader: "lut".into(), table, view: View::Iso, subject, filter: Filter::Linear, notes }
+}
+
+/// A subject this much thinner along one axis than along both others is seen along it.
+const FLAT: f64 = 0.6;
+/// Optical depth of a typical line through what is soft and through what is dense.
+const DEPTH: [f64; 2] = [1.0, 4.0];
+/// Optical depth of a typical line through a label.
+const LABEL_DEPTH: f64 = 1.5;
+
+const OUTLINE: [f64; 3] = [0.22, 0.06, 0.04];
+const SOFT: [f64; 3] = [0.86, 0.45, 0.28];
+const BONE: [f64; 3] = [1.0, 0.93, 0.80];
+const WHITE: [f64; 3] = [1.0, 1.0, 1.0];
+
+fn intensity(volume: &Volume, statistics: &Statistics, mut notes: Vec<String>) -> Automatic {
+    let background = statistics.background();
+    let Background { value, edge, sign } = background;
+    let inside = |v: f64| (v - edge) * sign > 0.0;
+    let (view, subject) = choose_view(volume, statistics, inside);
+    let top = if sign > 0.0 { statistics.percentile(0.9995) } else { statistics.percentile(0.0005) };
+    // Distances from the background from here on: the subject's are positive.
+    let far = |v: f64| (v - value) * sign;
+    let distances = statistics.sorted.iter().map(|&v| far(f64::from(v))).filter(|d| *d > far(edge));
+    let histogram = Histogram::of(distances, far(edge), far(top).max(far(edge) * 1.001));
+    let (split, certainty) = histogram.otsu();
+    let mean = |lo: f64, hi: f64| {
+        let within = (0..statistics::BINS).filter(|b| (lo..hi).contains(&histogram.value(*b)));
+        let (n, sum) = within
+            .fold((0.0, 0.0), |(n, s), b| (n + histogram.counts[b], s + histogram.counts[b] * histogram.value(b)));
+        if n > 0.0 { sum / n } else { 0.5 * (lo + hi) }
+    };
+    let (soft, dense) = (mean(0.0, split), mean(split, f64::INFINITY));
+    notes.push(format!(
+        "background {value:.5}, subject from {edge:.5}, soft about {:.5}, dense above {:.5} about {:.5} ({certainty:.2})",
+        value + sign * soft, value + sign * split, value + sign * dense
+    ));
+    let axis = view_axis(volume, view);
+    let along = smallest_units(volume, axis) * statistics.stride as f64;
+    let chord_soft = statistics.chord(axis, |v| inside(v) && far(v) < split) * along;
+    let chord_dense = statistics.chord(axis, |v| far(v) >= split) * along;
+    let (thin, thick) = (opacity(DEPTH[0], chord_soft), opacity(DEPTH[1], chord_dense));
+    let first = 0.5 * far(edge) + 0.5 * soft.min(2.0 * far(edge));
+    let at = |d: f64, color, opacity| point(value + sign * d, color, opacity);
+    let table = table(vec![
+        at(far(edge), OUTLINE, 0.0),
+        at(first.max(far(edge) * 1.01), OUTLINE, thin),
+        at(soft.max(far(edge) * 1.02), SOFT, thin),
+        at(split, SOFT.map(|c| c * 0.6), thin.max(0.3 * thick)),
+        at(dense, BONE, thick),
+        at(far(top).max(dense * 1.01), WHITE, thick),
+    ]);
+    Automatic { shader: "lut".into(), table, view, subject, filter: Filter::Linear, notes }
+}
+
+fn segmentation(volume: &Volume, statistics: &Statistics, labels: &BTreeSet<i64>, mut notes: Vec<String>) -> Automatic {
+    let background = statistics.background().value.round() as i64;
+    let labels = all_labels(volume, labels);
+    let shown: Vec<i64> = labels.iter().copied().filter(|l| *l != background).collect();
+    notes.push(format!("{} labels besides {background}: a colour for each, nearest sample", shown.len()));
+    let (view, subject) = choose_view(volume, statistics, |v| !v.is_nan() && v as i64 != background);
+    let axis = view_axis(volume, view);
+    let along = smallest_units(volume, axis) * statistics.stride as f64;
+    let mut points = vec![point(background as f64, [0.0; 3], 0.0)];
+    for (index, &label) in shown.iter().enumerate() {
+        let chord = statistics.chord(axis, |v| v as i64 == label) * along;
+        let (color, opacity) = (distinct_color(index), opacity(LABEL_DEPTH, chord.max(along)));
+        let value = label as f64;
+        points.extend([
+            point(value - 0.5, [0.0; 3], 0.0),
+            point(value - 0.5, color, opacity),
+            point(value + 0.5, color, opacity),
+            point(value + 0.5, [0.0; 3], 0.0),
+        ]);
+    }
+    Automatic { shader: "lut".into(), table: table(points), view, subject, filter: Filter::Nearest, notes }
+}
+
+/// The labels found in a part of the voxels, and those that the part missed.
+fn all_labels(volume: &Volume, found: &BTreeSet<i64>) -> BTreeSet<i64> {
+    let desc = volume.desc();
+    let mut labels = found.clone();
+    let mut last = None;
+    for index in 0..desc.samples().unwrap_or(0) {
+        let stored = desc.scalar.read(volume.data().bytes(), index);
+        if last != Some(stored) {
+            last = Some(stored);
+            let value = stored * desc.slope + desc.intercept;
+            if value.is_finite() {
+                labels.insert(value.round() as i64);
+            }
+        }
+    }
+    labels
+}
+
+/// Colours that differ from their neighbours: hues a golden section apart, bright and pale in turn.
+fn distinct_color(index: usize) -> [f64; 3] {
+    let hue = (0.02 + index as f64 * 0.618_033_988_75).fract() * 6.0;
+    let saturation = [0.75, 0.45, 0.6][index % 3];
+    let channel = |shift: f64| {
+        1.0 - saturation * (1.0 - ((hue + shift).rem_euclid(6.0) - 3.0).abs().min(2.0).max(1.0) + 1.0).clamp(0.0, 1.0)
+    };
+    [channel(0.0), channel(4.0), channel(2.0)]
+}
+
+/// Looks along the axis in which a flat subject is thin, else from in front, the right and above;
+/// and at the box that holds the subject.
+fn choose_view(volume: &Volume, statistics: &Statistics, inside: impl Fn(f64) -> bool) -> (View, Aabb) {
+    let Some(extent) = statistics.extent(inside) else { return (View::Iso, whole(volume)) };
+    let subject = world_box(volume, extent.map(|range| range.map(|i| i * statistics.stride)), 2 * statistics.stride);
+    let steps = world_steps(volume);
+    let count = |a: usize| ((extent[a][1] - extent[a][0] + 1) * statistics.stride) as f64;
+    let size: [f64; 3] = std::array::from_fn(|a| count(a) * steps[a].length());
+    let thin = (0..3).min_by(|a, b| size[*a].total_cmp(&size[*b])).unwrap_or(2);
+    let others = (0..3).filter(|a| *a != thin).map(|a| size[a]).fold(f64::INFINITY, f64::min);
+    if size[thin] > FLAT * others {
+        return (View::Iso, subject);
+    }
+    let direction = steps[thin].normalize_or(DVec3::Z).abs();
+    let views = [(View::Top, direction.z), (View::Front, direction.y), (View::Right, direction.x)];
+    (views.into_iter().max_by(|a, b| a.1.total_cmp(&b.1)).map_or(View::Iso, |(view, _)| view), subject)
+}
+
+/// The world box of samples from first to last along each axis, and `rim` more on every side.
+fn world_box(volume: &Volume, samples: [[usize; 2]; 3], rim: usize) -> Aabb {
+    let desc = volume.desc();
+    let corner = |side: usize| {
+        let at = |a: usize| match side {
+            0 => samples[a][0].saturating_sub(rim),
+            _ => (samples[a][1] + rim).min(desc.dims[a] - 1),
+        };
+        DVec3::new(at(0) as f64, at(1) as f64, at(2) as f64) * desc.spacing
+    };
+    let (min, max) = (corner(0), corner(1));
+    // A plane of samples is one spacing thick.
+    let thick = DVec3::select(min.cmpeq(max), desc.spacing / 2.0, DVec3::ZERO);
+    let corners = Aabb::new(min - thick, max + thick).corners().map(|c| desc.placement.transform_point3(c));
+    corners.iter().fold(Aabb::EMPTY, |b, &c| Aabb::new(b.min.min(c), b.max.max(c)))
+}
+
+fn whole(volume: &Volume) -> Aabb {
+    world_box(volume, volume.dims().map(|n| [0, n - 1]), 0)
+}
+
+/// From one sample to the next along each axis, in world space.
+fn world_steps(volume: &Volume) -> [DVec3; 3] {
+    let desc = volume.desc();
+    let axes = [DVec3::X, DVec3::Y, DVec3::Z];
+    std::array::from_fn(|a| desc.placement.transform_vector3(axes[a] * desc.spacing[a]))
+}
+
+/// The axis of the grid that is nearest to the direction of view.
+fn view_axis(volume: &Volume, view: View) -> usize {
+    let (towards_eye, _) = view.axes();
+    let along = world_steps(volume).map(|s| s.normalize_or_zero().dot(towards_eye).abs());
+    (0..3).max_by(|a, b| along[*a].total_cmp(&along[*b])).unwrap_or(2)
+}
+
+/// The length of one voxel along an axis in unit distances.
+fn smallest_units(volume: &Volume, axis: usize) -> f64 {
+    let unit = smallest_voxel(&VolumeTexture::new(volume), &volume.desc().placement);
+    world_steps(volume)[axis].length() / unit
+}
+
+/// The opacity over one unit distance that gives an optical depth over a length in such units.
+fn opacity(depth: f64, length: f64) -> f64 {
+    1.0 - (-depth / length.max(1.0)).exp()
+}
+
+fn point(value: f64, color: [f64; 3], opacity: f64) -> ControlPoint {
+    ControlPoint { value, color, opacity }
+}
+
+fn table(points: Vec<ControlPoint>) -> Option<LookupTable> {
+    LookupTable::from_points(points).ok()
+}
+
+#[cfg(test)]
+mod tests;
