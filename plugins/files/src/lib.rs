@@ -1,0 +1,84 @@
+//! File formats for Volact: volumes in, pictures out.
+//!
+//! [`loaders`] gives every format as a [`Loader`] for a registry. Each module says what it reads,
+//! which options it takes and where its limits are.
+//!
+//! - Opening reads headers only and compares the promised sizes with the files; a compressed file
+//!   that could not hold what its header promises is refused before memory is taken for it.
+//! - Voxels arrive in native byte order, x fastest. Large raw files in that order are mapped:
+//!   while such a volume lives, its file must not be changed or cut.
+//! - Regions of uncompressed formats are read by seeking; of compressed ones by decoding up to the
+//!   region's end and keeping the region only.
+//! - World space of medical formats is LPS.
+
+mod dicom;
+mod elements;
+mod fields;
+mod format;
+mod metaimage;
+mod nifti;
+mod nrrd;
+mod payload;
+pub mod picture;
+mod png_series;
+mod raw;
+mod series;
+mod slices;
+mod storage;
+mod tiff_pages;
+mod vti;
+mod vtk;
+mod world;
+
+use std::{path::Path, sync::Arc};
+
+use volact_core::{LoadError, LoadOptions, Loader, VolumeReader, names};
+
+pub use storage::Storage;
+
+use format::Format;
+
+fn formats() -> Vec<Format> {
+    vec![
+        nrrd::format(),
+        metaimage::format(),
+        nifti::format(),
+        dicom::format(),
+        tiff_pages::format(),
+        png_series::format(),
+        vtk::format(),
+        vti::format(),
+        raw::format(),
+    ]
+}
+
+/// All loaders of this crate: nrrd, metaimage, nifti, dicom, tiff, png, vtk, vti and raw.
+pub fn loaders() -> Vec<Arc<dyn Loader>> {
+    formats().into_iter().map(|format| Arc::new(format) as Arc<dyn Loader>).collect()
+}
+
+/// Opens a file of a [`Storage`] with the loader of that name, as [`Loader::open`] does on disk.
+///
+/// # Errors
+/// As [`Loader::open`], and if no loader has that name or an option is wrong.
+pub fn open_in(
+    storage: &Storage,
+    loader: &str,
+    path: &Path,
+    options: &LoadOptions,
+) -> Result<Box<dyn VolumeReader>, LoadError> {
+    let formats = formats();
+    let names = || formats.iter().map(Format::name);
+    let Some(format) = formats.iter().find(|f| f.name() == loader) else {
+        return Err(LoadError::UnknownLoader {
+            name: loader.into(),
+            hint: names::hint(loader, names()),
+            known: names().collect::<Vec<_>>().join(", "),
+        });
+    };
+    let options = format.declaration().resolve(options, |_| false).map_err(|problems| LoadError::Options {
+        loader: loader.into(),
+        problem: problems.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "),
+    })?;
+    format.open_in(storage, path, &options)
+}

@@ -1,0 +1,57 @@
+//! Volumes that lie in files slice by slice.
+
+use std::path::PathBuf;
+
+use volact_core::{Buffer, LoadError, Progress, Region, VolumeDesc, VolumeReader, Warning};
+
+use crate::payload::{check_region, crop_slice, reserve};
+
+/// Decodes single slices.
+pub(crate) trait SliceSource: Send {
+    /// All samples of slice `z`, in native byte order.
+    fn slice(&mut self, z: usize) -> Result<Vec<u8>, LoadError>;
+}
+
+/// The reader over a [`SliceSource`]: decodes the slices of a region, one at a time.
+pub(crate) struct SliceReader<S> {
+    pub(crate) path: PathBuf,
+    pub(crate) desc: VolumeDesc,
+    pub(crate) warnings: Vec<Warning>,
+    pub(crate) source: S,
+}
+
+impl<S: SliceSource> VolumeReader for SliceReader<S> {
+    fn desc(&self) -> &VolumeDesc {
+        &self.desc
+    }
+
+    fn warnings(&self) -> &[Warning] {
+        &self.warnings
+    }
+
+    fn read_region(&mut self, region: Region, progress: &dyn Progress) -> Result<Buffer, LoadError> {
+        check_region(&self.path, self.desc.dims, region)?;
+        let [nx, ny, _] = self.desc.dims;
+        let sample = self.desc.components * self.desc.scalar.size();
+        let [w, h, depth] = region.dims();
+        let total = w * h * depth * sample;
+        // Memory grows with what is decoded: the first slice has to arrive before the rest is believed.
+        let mut out = Vec::new();
+        for z in region.min[2]..=region.max[2] {
+            let slice = self.source.slice(z)?;
+            if slice.len() != nx * ny * sample {
+                let (found, wanted) = (slice.len() as u64, (nx * ny * sample) as u64);
+                let what = format!("slice {z}");
+                return Err(LoadError::Truncated { path: self.path.clone(), what, found, wanted });
+            }
+            if out.is_empty() {
+                out = reserve(&self.path, total)?;
+            }
+            crop_slice(&slice, nx, region, sample, &mut out);
+            if !progress.advance(out.len() as u64, total as u64) {
+                return Err(LoadError::Stopped { path: self.path.clone() });
+            }
+        }
+        Ok(out.into())
+    }
+}
