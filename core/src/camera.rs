@@ -374,6 +374,7 @@ fn matrices(view: DMat4, projection: DMat4, depth: DepthRange, viewport: &Viewpo
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::dcamera::rh::proj::directx;
     use proptest::prelude::*;
 
     fn viewport(width: usize, height: usize) -> Viewport {
@@ -423,13 +424,13 @@ mod tests {
         ) {
             let eye = DVec3::from_array(eye) + DVec3::new(0.0, -20.0, 0.0);
             let (near, far, aspect) = (0.5, 80.0, 37.0 / 23.0);
-            let view = DMat4::from_cols_array(&glam::DMat4::look_at_rh(eye, DVec3::ZERO, DVec3::Z).to_cols_array());
+            let view = glam::dcamera::rh::view::look_at_mat4(eye, DVec3::ZERO, DVec3::Z);
             let height = fov / 5.0;
             let (projection, kind) = if ortho {
                 let (w, h) = (height * aspect / 2.0, height / 2.0);
-                (DMat4::orthographic_rh(-w, w, -h, h, near, far), Projection::Orthographic { height })
+                (directx::orthographic(-w, w, -h, h, near, far), Projection::Orthographic { height })
             } else {
-                (DMat4::perspective_rh(fov.to_radians(), aspect, near, far), Projection::Perspective { fov_y: fov })
+                (directx::perspective(fov.to_radians(), aspect, near, far), Projection::Perspective { fov_y: fov })
             };
             let look = Camera::LookAt { eye, target: DVec3::ZERO, up: DVec3::Z, projection: kind, near, far };
             compare(look, Camera::Matrices { view, projection, depth: DepthRange::ZeroToOne })?;

@@ -1,0 +1,164 @@
+//! Config files: defaults and preferences, as one RON document.
+//!
+//! A config is never needed: every part has a default, and the library reads none on its own.
+//!
+//! ```
+//! use volact_core::config::Config;
+//!
+//! let config = Config::parse(r#"Config(
+//!     version: 1,
+//!     prefer: ["wgpu", "vulkan", "cpu"],           // the first that can draw a scene is taken
+//!     options: {"cpu": {"threads": 2}},            // for each action, below what a scene says
+//!     image: (size: (640, 480), background: (0, 0, 0, 1)),
+//!     view: "iso",                                 // of bare volumes and scenes without a camera
+//! )"#)?;
+//! assert_eq!(config.prefer, ["wgpu", "vulkan", "cpu"]);
+//! assert_eq!(Config::parse("Config(version: 1)")?, Config::default());
+//! # Ok::<(), volact_core::scene::Problems>(())
+//! ```
+
+use std::{collections::BTreeMap, path::Path};
+
+use crate::{
+    Options, View,
+    scene::{
+        ParameterSpec, Problems, SceneError, background, parse_document, plain_parameters, read_text,
+        reader::{At, Reader},
+        size, view,
+    },
+};
+
+/// The version of the config format that this build reads.
+pub const CONFIG_VERSION: u32 = 1;
+
+/// The actions that are tried where nobody says otherwise.
+pub const PREFERRED: [&str; 3] = ["wgpu", "vulkan", "cpu"];
+
+/// Defaults and preferences.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Config {
+    /// The names of actions, best first. One that is not registered is passed over.
+    pub prefer: Vec<String>,
+    /// Options by the action's name.
+    pub options: BTreeMap<String, Options>,
+    /// Columns and rows of a picture that does not say.
+    pub size: [usize; 2],
+    /// The background of a picture that does not say: straight RGBA.
+    pub background: [f32; 4],
+    /// The view of a scene that does not say.
+    pub view: View,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            prefer: PREFERRED.map(str::to_owned).to_vec(),
+            options: BTreeMap::new(),
+            size: [512, 512],
+            background: [0.0, 0.0, 0.0, 1.0],
+            view: View::Front,
+        }
+    }
+}
+
+impl Config {
+    /// Reads a config from a text.
+    ///
+    /// # Errors
+    /// All problems, in the order of the text.
+    pub fn parse(text: &str) -> Result<Self, Problems> {
+        let root = parse_document(text).map_err(|problem| Problems::new(vec![problem]))?;
+        let mut reader = Reader::default();
+        let at = reader.root(&root);
+        let config = read(&mut reader, &at);
+        reader.done()?;
+        Ok(config.unwrap_or_default())
+    }
+
+    /// Reads a config file.
+    ///
+    /// # Errors
+    /// If the file cannot be read, or all its problems.
+    pub fn open(path: impl AsRef<Path>) -> Result<Self, SceneError> {
+        let path = path.as_ref();
+        let text = read_text(path)?;
+        Ok(Self::parse(&text).map_err(|problems| problems.of_file(path.display().to_string()))?)
+    }
+
+    /// The options of an action: those given, and below them those of this config.
+    pub fn options_of(&self, action: &str, given: &Options) -> Options {
+        let mut options = self.options.get(action).cloned().unwrap_or_default();
+        options.extend(given.clone());
+        options
+    }
+}
+
+fn read(reader: &mut Reader, at: &At) -> Option<Config> {
+    let fields = reader.fields(at, &["Config"], &["version", "prefer", "options", "image", "view"])?;
+    reader.version(&fields, CONFIG_VERSION);
+    let mut config = Config::default();
+    if let Some(at) = fields.optional("prefer") {
+        let names = reader.list(&at, "a list of actions' names").unwrap_or_default();
+        config.prefer = names.iter().filter_map(|at| reader.name(at)).collect();
+        if names.is_empty() {
+            reader.refuse::<()>(&at, "at least one action's name");
+        }
+    }
+    if let Some(at) = fields.optional("options") {
+        for (action, at) in reader.map(&at, "a map of options by action, {\"cpu\": {…}}") {
+            config.options.insert(action.to_owned(), options(reader, &at));
+        }
+    }
+    if let Some(at) = fields.optional("image")
+        && let Some(image) = reader.fields(&at, &["Image"], &["size", "background"])
+    {
+        config.size = image.optional("size").and_then(|at| size(reader, &at)).unwrap_or(config.size);
+        let color = image.optional("background").and_then(|at| background(reader, &at));
+        config.background = color.unwrap_or(config.background);
+    }
+    config.view = fields.optional("view").and_then(|at| view(reader, &at)).unwrap_or_default();
+    Some(config)
+}
+
+fn options(reader: &mut Reader, at: &At) -> Options {
+    let value = |(name, spec)| match spec {
+        ParameterSpec::Value(value) => Some((name, value)),
+        _ => None,
+    };
+    plain_parameters(reader, at).into_iter().filter_map(value).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ParameterValue;
+
+    #[test]
+    fn defaults_stated_equal_defaults_left_out() {
+        let stated = r#"(version: 1, prefer: ["wgpu", "vulkan", "cpu"], options: {}, view: "front",
+            image: (size: (512, 512), background: (0, 0, 0, 1)))"#;
+        assert_eq!(Config::parse(stated).unwrap(), Config::default());
+    }
+
+    #[test]
+    fn all_problems_come_at_once() {
+        let text = "Config(\n  version: 2,\n  prefered: [],\n  options: {\"cpu\": {\"threads\": (1,)}},\n  view: \"frnt\",\n  image: (size: (0, 1)),\n)";
+        let expected = "\
+2:12: version: found 2, wanted 1, the version of the format that this build reads
+3:3: found field `prefered`, wanted version, prefer, options, image, view; did you mean \"prefer\"?
+4:32: options.cpu.threads: found a tuple of 1 value, wanted 2, 3 or 4 numbers
+5:9: view: found \"frnt\", wanted one of front, back, left, right, top, bottom, iso; did you mean \"front\"?
+6:18: image.size[0]: found 0, wanted a whole number from 1 on";
+        assert_eq!(Config::parse(text).unwrap_err().to_string(), expected);
+    }
+
+    #[test]
+    fn given_options_win() {
+        let config = Config::parse(r#"(version: 1, options: {"cpu": {"threads": 2, "jitter": true}})"#).unwrap();
+        let given = Options::from([("threads".to_owned(), ParameterValue::Int(7))]);
+        let options = config.options_of("cpu", &given);
+        assert_eq!(options["threads"], ParameterValue::Int(7));
+        assert_eq!(options["jitter"], ParameterValue::Bool(true));
+        assert!(config.options_of("wgpu", &Options::new()).is_empty());
+    }
+}

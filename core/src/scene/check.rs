@@ -1,0 +1,230 @@
+//! Checks a description against itself and against what is registered.
+
+use std::collections::BTreeMap;
+
+use super::{GeometrySpec, ParameterSpec, Problem, SceneFile, ShapeSpec, TransformStep};
+use crate::{
+    Declaration, ParameterDecl, ParameterType, ParameterValue, Registry,
+    parameter::{Kind, ProblemKind},
+};
+
+/// Names inside the scene that lead nowhere.
+pub(super) fn references(scene: &SceneFile) -> Vec<Problem> {
+    let mut problems = Vec::new();
+    for (i, shape) in scene.shapes.iter().enumerate() {
+        let path = format!("shapes[{i}]");
+        volumes_exist(scene, &format!("{path}.parameters"), &shape.parameters, &mut problems);
+        if let GeometrySpec::Named { parameters, .. } = &shape.geometry {
+            volumes_exist(scene, &format!("{path}.geometry.parameters"), parameters, &mut problems);
+        }
+        let unread = scene.place(&format!("{path}.parameters.volume")).is_some() || shape.shader.is_empty();
+        if shape.volume().is_none() && !unread {
+            needs_volume(scene, &path, shape, &mut problems);
+        }
+    }
+    problems
+}
+
+fn volumes_exist(
+    scene: &SceneFile,
+    path: &str,
+    parameters: &BTreeMap<String, ParameterSpec>,
+    problems: &mut Vec<Problem>,
+) {
+    for (name, value) in parameters {
+        let ParameterSpec::Volume(volume) = value else { continue };
+        if volume.data.is_empty() || scene.data.contains_key(&volume.data) {
+            continue;
+        }
+        let known: Vec<_> = scene.data.keys().map(String::as_str).collect();
+        let wanted = match known.is_empty() {
+            true => "an entry under `data`, which has none".to_owned(),
+            false => format!("a name under `data`: {}", known.join(", ")),
+        };
+        let problem = scene.problem(&format!("{path}.{name}.data"), format!("{:?}", volume.data), wanted);
+        problems.push(problem.near(&volume.data, known));
+    }
+}
+
+/// A shape without a volume has nothing to be around, and no place of a volume's.
+fn needs_volume(scene: &SceneFile, path: &str, shape: &ShapeSpec, problems: &mut Vec<Problem>) {
+    let at = |field: &str| {
+        let inner = format!("{path}.{field}");
+        if scene.place(&inner).is_some() { inner } else { path.to_owned() }
+    };
+    if shape.geometry == GeometrySpec::Around {
+        let wanted = "a parameter with a volume, or a `geometry`";
+        problems.push(scene.problem(&at("geometry"), "a shape without a volume", wanted));
+    }
+    if shape.transform.iter().flatten().any(|step| *step == TransformStep::Placement) {
+        problems.push(scene.problem(&at("transform"), "`Placement` in a shape without a volume", "other steps"));
+    }
+}
+
+/// Names and parameters that nobody registered.
+pub(super) fn check(scene: &SceneFile, registry: &Registry) -> Vec<Problem> {
+    let mut check = Check { scene, registry, problems: Vec::new() };
+    for (name, data) in &scene.data {
+        if let Some(loader) = &data.loader {
+            let path = format!("data.{name}");
+            let declaration = check.known(Kind::Loader, loader, &format!("{path}.loader"));
+            check.given(declaration, &format!("{path}.options"), &data.options, |_| false);
+        }
+    }
+    for (i, shape) in scene.shapes.iter().enumerate() {
+        check.shape(&format!("shapes[{i}]"), shape);
+    }
+    check.action();
+    check.problems
+}
+
+struct Check<'a> {
+    scene: &'a SceneFile,
+    registry: &'a Registry,
+    problems: Vec<Problem>,
+}
+
+impl<'a> Check<'a> {
+    /// The declaration of that kind and name, or a problem.
+    fn known(&mut self, kind: Kind, name: &str, path: &str) -> Option<&'a Declaration> {
+        let all: Vec<_> = self.registry.declarations().into_iter().filter(|d| d.kind == kind).collect();
+        let found = all.iter().find(|d| d.name == name).copied();
+        if found.is_none() && !name.is_empty() {
+            let known: Vec<_> = all.iter().map(|d| d.name.as_str()).collect();
+            let wanted = format!("a registered {}: {}", kind.name(), known.join(", "));
+            self.problems.push(self.scene.problem(path, format!("{name:?}"), wanted).near(name, known));
+        }
+        found
+    }
+
+    fn shape(&mut self, path: &str, shape: &ShapeSpec) {
+        let shaders = self.registry.shaders();
+        let declaration = self.known(Kind::Shader, &shape.shader, &format!("{path}.shader"));
+        self.given(declaration, &format!("{path}.parameters"), &shape.parameters, |name| shaders.declares(name));
+        if let Some(declaration) = declaration {
+            self.missing(declaration, path, &shape.parameters);
+        }
+        if let GeometrySpec::Named { name, parameters } = &shape.geometry {
+            let path = format!("{path}.geometry");
+            let declaration = self.known(Kind::Geometry, name, &format!("{path}.name"));
+            self.given(declaration, &format!("{path}.parameters"), parameters, |_| false);
+            if let Some(declaration) = declaration {
+                self.missing(declaration, &path, parameters);
+            }
+        }
+    }
+
+    fn action(&mut self) {
+        let Some(action) = &self.scene.action else { return };
+        let mut declaration = self.known(Kind::Action, &action.name, "action.name");
+        let mut options = action.options.clone();
+        if action.name == "checked" {
+            // What it does not take itself is for the action that it wraps.
+            let of = match options.remove("of") {
+                Some(ParameterSpec::Value(ParameterValue::Choice(of))) => of,
+                _ => "cpu".into(),
+            };
+            declaration = self.known(Kind::Action, &of, "action.options.of");
+        }
+        self.given(declaration, "action.options", &options, |_| false);
+    }
+
+    /// Values that are given but not what is declared.
+    fn given(
+        &mut self,
+        declaration: Option<&Declaration>,
+        path: &str,
+        given: &BTreeMap<String, ParameterSpec>,
+        elsewhere: impl Fn(&str) -> bool,
+    ) {
+        let Some(declaration) = declaration else { return };
+        for (name, value) in given {
+            let at = format!("{path}.{name}");
+            match declaration.parameter(name) {
+                Some(decl) => {
+                    if let Err((found, wanted)) = fits(value, decl) {
+                        self.problems.push(self.scene.problem(&at, found, wanted));
+                    }
+                }
+                None if elsewhere(name) => {}
+                None => {
+                    let known: Vec<_> = declaration.parameters.iter().map(|p| p.name.as_str()).collect();
+                    let (kind, of) = (declaration.kind.name(), &declaration.name);
+                    let wanted = match known.is_empty() {
+                        true => format!("no parameters, for {kind} {of:?} has none"),
+                        false => format!("a parameter of {kind} {of:?}: {}", known.join(", ")),
+                    };
+                    let mut problem = self.scene.problem(&at, "a parameter that nobody declares", wanted);
+                    problem = problem.near(name, known);
+                    if problem.nearest.is_none() && declaration.kind == Kind::Shader {
+                        let all = self.registry.shaders().iter().flat_map(|s| &s.declaration.parameters);
+                        problem = problem.near(name, all.map(|p| p.name.as_str()));
+                    }
+                    self.problems.push(problem);
+                }
+            }
+        }
+    }
+
+    /// Values that are declared as required but not given. A shape's unit distance is found when
+    /// it is built, and what was given but could not be read is a problem already.
+    fn missing(&mut self, declaration: &Declaration, path: &str, given: &BTreeMap<String, ParameterSpec>) {
+        let all = format!("{path}.parameters");
+        for decl in declaration.parameters.iter().filter(|p| p.required && p.name != "unit_distance") {
+            let at = format!("{all}.{}", decl.name);
+            if given.contains_key(&decl.name) || self.scene.place(&at).is_some() {
+                continue;
+            }
+            let spot = self.scene.place(&all).or_else(|| self.scene.place(path));
+            let wanted = format!("{}: {}", types(decl), decl.description);
+            self.problems.push(Problem::new(spot, &at, "nothing", wanted));
+        }
+    }
+}
+
+fn types(decl: &ParameterDecl) -> String {
+    decl.types.iter().map(|t| t.name()).collect::<Vec<_>>().join(" or ")
+}
+
+/// Whether a value is what is declared; what was found and wanted where it is not.
+fn fits(value: &ParameterSpec, decl: &ParameterDecl) -> Result<(), (String, String)> {
+    let kind = match value {
+        ParameterSpec::Value(value) => {
+            return match decl.accept(&coerce(value, decl)).map_err(|p| p.kind) {
+                Err(ProblemKind::Mistyped { found, wanted }) => Err((found, wanted)),
+                _ => Ok(()),
+            };
+        }
+        ParameterSpec::Volume(_) => ParameterType::Volume,
+        ParameterSpec::Table(_) => ParameterType::Table,
+        ParameterSpec::Attribute(_) => ParameterType::Attribute,
+    };
+    if decl.types.contains(&kind) { Ok(()) } else { Err((format!("a {kind}"), types(decl))) }
+}
+
+/// Three or four numbers are a colour where a colour is wanted.
+pub(super) fn coerce(value: &ParameterValue, decl: &ParameterDecl) -> ParameterValue {
+    let takes = |kind| decl.types.contains(&kind);
+    match value {
+        ParameterValue::Vec3(v) if takes(ParameterType::Color) && !takes(ParameterType::Vec3) => {
+            ParameterValue::Color([v.x, v.y, v.z, 1.0])
+        }
+        ParameterValue::Vec4(v) if takes(ParameterType::Color) && !takes(ParameterType::Vec4) => {
+            ParameterValue::Color(v.to_array())
+        }
+        other => other.clone(),
+    }
+}
+
+impl ShapeSpec {
+    /// The first volume among the parameters, `volume` before others, with its parameter's name.
+    pub(super) fn volume(&self) -> Option<(&str, &super::VolumeSpec)> {
+        let volumes = || {
+            self.parameters.iter().filter_map(|(name, value)| match value {
+                ParameterSpec::Volume(volume) => Some((name.as_str(), volume)),
+                _ => None,
+            })
+        };
+        volumes().find(|(name, _)| *name == "volume").or_else(|| volumes().next())
+    }
+}

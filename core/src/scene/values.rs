@@ -1,0 +1,89 @@
+//! Makes tables and attributes from their descriptions and files.
+
+use std::{fs, io::Read, path::Path};
+
+use super::{AttributeSpec, AttributeValues, TableEntries, TableSpec};
+use crate::{Buffer, LookupTable, ScalarType, parameter::Attribute};
+
+/// The longest table or attribute file in bytes.
+const MAX_FILE: u64 = 1 << 30;
+
+/// What was found, and what was wanted.
+type Fault = (String, String);
+
+/// A lookup table.
+pub(super) fn table(spec: &TableSpec, base: &Path) -> Result<LookupTable, Fault> {
+    let fault = |error: crate::table::TableError| (error.to_string(), "a lookup table".to_owned());
+    let table = match &spec.entries {
+        TableEntries::Points(points) => LookupTable::from_points(points.clone()),
+        TableEntries::Entries { values, domain } => LookupTable::from_entries(values.clone(), *domain),
+        TableEntries::File { file, domain } => {
+            let bytes = read(&base.join(file), 16)?;
+            let number = |b: &[u8]| f32::from_le_bytes([b[0], b[1], b[2], b[3]]);
+            let numbers: Vec<f32> = bytes.chunks_exact(4).map(number).collect();
+            LookupTable::from_entries(numbers, *domain)
+        }
+        TableEntries::WindowLevel { window, level, opacity } => LookupTable::window_level(*window, *level, *opacity),
+    };
+    let table = table.map_err(fault)?;
+    Ok(if spec.pre_interpolated { table.pre_interpolated() } else { table })
+}
+
+/// Per-vertex numbers.
+pub(super) fn attribute(spec: &AttributeSpec, base: &Path) -> Result<Attribute, Fault> {
+    let size = spec.scalar.size();
+    let data = match &spec.values {
+        AttributeValues::Inline(values) => {
+            if !values.len().is_multiple_of(spec.components) {
+                return Err((
+                    format!("{} numbers", values.len()),
+                    format!("a multiple of {} components", spec.components),
+                ));
+            }
+            let mut bytes = Vec::with_capacity(values.len() * size);
+            values.iter().for_each(|v| write(spec.scalar, *v, &mut bytes));
+            bytes
+        }
+        AttributeValues::File(file) => {
+            let mut bytes = read(&base.join(file), size.saturating_mul(spec.components))?;
+            if cfg!(target_endian = "big") {
+                bytes.chunks_exact_mut(size).for_each(<[u8]>::reverse);
+            }
+            bytes
+        }
+    };
+    Ok(Attribute {
+        name: spec.name.clone(),
+        scalar: spec.scalar,
+        components: spec.components,
+        data: Buffer::from_vec(data),
+    })
+}
+
+/// Appends a number as that type, in native byte order; integers are rounded and clamped.
+fn write(scalar: ScalarType, value: f64, bytes: &mut Vec<u8>) {
+    let whole = value.round();
+    match scalar {
+        ScalarType::U8 => bytes.extend((whole as u8).to_ne_bytes()),
+        ScalarType::I8 => bytes.extend((whole as i8).to_ne_bytes()),
+        ScalarType::U16 => bytes.extend((whole as u16).to_ne_bytes()),
+        ScalarType::I16 => bytes.extend((whole as i16).to_ne_bytes()),
+        ScalarType::U32 => bytes.extend((whole as u32).to_ne_bytes()),
+        ScalarType::I32 => bytes.extend((whole as i32).to_ne_bytes()),
+        ScalarType::F16 => bytes.extend(half::f16::from_f64(value).to_ne_bytes()),
+        ScalarType::F32 => bytes.extend((value as f32).to_ne_bytes()),
+        ScalarType::F64 => bytes.extend(value.to_ne_bytes()),
+    }
+}
+
+/// A whole file, which must hold a multiple of `unit` bytes and not be endless.
+fn read(path: &Path, unit: usize) -> Result<Vec<u8>, Fault> {
+    let io = |e: std::io::Error| (format!("{}: cannot be read: {e}", path.display()), "a file of numbers".to_owned());
+    let mut bytes = Vec::new();
+    fs::File::open(path).map_err(io)?.take(MAX_FILE + 1).read_to_end(&mut bytes).map_err(io)?;
+    if bytes.len() as u64 > MAX_FILE || bytes.is_empty() || !bytes.len().is_multiple_of(unit.max(1)) {
+        let found = format!("{}: {} bytes", path.display(), bytes.len());
+        return Err((found, format!("a multiple of {unit} bytes, at most {MAX_FILE}")));
+    }
+    Ok(bytes)
+}

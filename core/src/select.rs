@@ -1,0 +1,180 @@
+//! Chooses an action: the first preferred one that can draw a scene, with the reasons why those
+//! before it were not taken.
+
+use std::fmt;
+
+use thiserror::Error;
+
+use crate::{
+    ActionError, Caps, Compositing, Options, Registry, RenderAction, Shape, config::Config, resolve::ResolvedShape,
+};
+
+/// An action that can draw a scene and manages its shapes.
+pub struct Choice {
+    /// Its registered name.
+    pub name: String,
+    /// The action, which manages all shapes.
+    pub action: Box<dyn RenderAction>,
+    /// The actions that were preferred but not taken, with the reasons.
+    pub refused: Vec<(String, String)>,
+}
+
+impl fmt::Debug for Choice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Choice").field("name", &self.name).field("refused", &self.refused).finish_non_exhaustive()
+    }
+}
+
+/// Why there is no action for a scene.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum SelectError {
+    /// The scene or its caller names an action, and that one cannot.
+    #[error(transparent)]
+    Action(#[from] ActionError),
+    /// None of the preferred actions can.
+    #[error("no preferred action can draw this scene: {}", reasons(refused))]
+    None {
+        /// Each action with its reason.
+        refused: Vec<(String, String)>,
+    },
+}
+
+fn reasons(refused: &[(String, String)]) -> String {
+    refused.iter().map(|(name, why)| format!("{name}: {why}")).collect::<Vec<_>>().join("; ")
+}
+
+/// Makes the action `named` where there is one; else the first that `config` prefers and that can
+/// draw all shapes. `options` go above those of the config.
+///
+/// # Errors
+/// If the named action cannot be made or refuses a shape, or no preferred action can draw.
+pub fn select(
+    registry: &Registry,
+    config: &Config,
+    named: Option<&str>,
+    options: &Options,
+    shapes: &[Shape],
+) -> Result<Choice, SelectError> {
+    if let Some(name) = named {
+        let mut action = registry.action(name, &config.options_of(name, options))?;
+        shapes.iter().try_for_each(|shape| action.manage(shape))?;
+        return Ok(Choice { name: name.into(), action, refused: Vec::new() });
+    }
+    let mut refused = Vec::new();
+    for name in &config.prefer {
+        match attempt(registry, name, &config.options_of(name, options), shapes) {
+            Ok(action) => return Ok(Choice { name: name.clone(), action, refused }),
+            Err(why) => {
+                log::info!("action {name} is not taken: {why}");
+                refused.push((name.clone(), why));
+            }
+        }
+    }
+    Err(SelectError::None { refused })
+}
+
+fn attempt(
+    registry: &Registry,
+    name: &str,
+    options: &Options,
+    shapes: &[Shape],
+) -> Result<Box<dyn RenderAction>, String> {
+    if !registry.action_names().any(|known| known == name) {
+        return Err("not registered".into());
+    }
+    let mut action = registry.action(name, options).map_err(|e| chain(&e))?;
+    let resolved: Result<Vec<_>, _> = shapes.iter().map(|s| ResolvedShape::new(s, registry.shaders())).collect();
+    let resolved = resolved.map_err(|e| chain(&e))?;
+    can_draw(&action.caps(), &resolved)?;
+    shapes.iter().try_for_each(|shape| action.manage(shape)).map_err(|e| chain(&e))?;
+    Ok(action)
+}
+
+/// Whether an action's capabilities cover all shapes; the reason where they do not.
+///
+/// # Errors
+/// What is missing, in words.
+pub fn can_draw(caps: &Caps, shapes: &[ResolvedShape]) -> Result<(), String> {
+    for shape in shapes {
+        let geometry = shape.state.geometry.name();
+        if caps.shaders.as_ref().is_some_and(|known| !known.contains(&shape.state.shader)) {
+            return Err(format!("does not draw shader {:?} (shape {:?})", shape.state.shader, shape.name));
+        }
+        if caps.geometries.as_ref().is_some_and(|known| !known.iter().any(|g| g == geometry)) {
+            return Err(format!("does not draw geometry {geometry:?} (shape {:?})", shape.name));
+        }
+        if !caps.compositing.contains(&shape.compositing()) {
+            return Err(format!("does not composite by {:?} (shape {:?})", shape.compositing().name(), shape.name));
+        }
+    }
+    match overlapping(shapes) {
+        Some((a, b)) if !caps.overlap => Err(format!("does not draw overlapping shapes ({a:?} and {b:?})")),
+        _ => Ok(()),
+    }
+}
+
+/// Two `over` shapes whose world boxes share more than a face.
+fn overlapping(shapes: &[ResolvedShape]) -> Option<(&str, &str)> {
+    let over: Vec<_> = shapes.iter().filter(|s| s.compositing() == Compositing::Over).collect();
+    over.iter().enumerate().find_map(|(i, a)| {
+        let overlaps = |b: &&&ResolvedShape| {
+            let both = a.state.world_bounds().intersection(&b.state.world_bounds());
+            both.min.cmplt(both.max).all()
+        };
+        over[i + 1..].iter().find(overlaps).map(|b| (a.name.as_str(), b.name.as_str()))
+    })
+}
+
+fn chain(error: &dyn std::error::Error) -> String {
+    match error.source() {
+        Some(cause) => format!("{error}: {}", chain(cause)),
+        None => error.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Appearance, Block, ScalarType, Volume, VolumeDesc};
+    use glam::DVec3;
+
+    fn shapes(n: usize) -> Vec<Shape> {
+        let volume = Volume::new(VolumeDesc::new([2, 2, 2], ScalarType::U8, 1), vec![0u8; 8]).unwrap();
+        (0..n).map(|_| Shape::around(&volume, Appearance::new("simple").with("unit_distance", 1.0))).collect()
+    }
+
+    fn resolved(shapes: &[Shape]) -> Vec<ResolvedShape> {
+        let registry = Registry::with_core();
+        shapes.iter().map(|s| ResolvedShape::new(s, registry.shaders()).unwrap()).collect()
+    }
+
+    #[test]
+    fn reasons_are_reported_for_each_action() {
+        let config = Config { prefer: vec!["wgpu".into(), "null".into()], ..Config::default() };
+        let error = select(&Registry::with_core(), &config, None, &Options::new(), &shapes(1)).unwrap_err();
+        let expected = "no preferred action can draw this scene: wgpu: not registered; \
+            null: does not composite by \"over\" (shape \"volume\")";
+        assert_eq!(error.to_string(), expected);
+    }
+
+    #[test]
+    fn named_action_is_taken_as_it_is() {
+        let (registry, config) = (Registry::with_core(), Config::default());
+        let choice = select(&registry, &config, Some("null"), &Options::new(), &shapes(1)).unwrap();
+        assert_eq!((choice.name.as_str(), choice.refused.len()), ("null", 0));
+        let error = select(&registry, &config, Some("nul"), &Options::new(), &[]).unwrap_err();
+        assert!(error.to_string().contains("did you mean \"null\"?"));
+    }
+
+    #[test]
+    fn overlap_is_asked_for_only_where_shapes_overlap() {
+        let caps = Caps { compositing: vec![Compositing::Over], ..Caps::default() };
+        let two = shapes(2);
+        assert!(can_draw(&caps, &resolved(&two)).unwrap_err().contains("overlapping"));
+        two[1].set_geometry(Block::new(DVec3::X, DVec3::ONE).unwrap());
+        assert_eq!(can_draw(&caps, &resolved(&two)), Ok(()));
+        let none = Caps { shaders: Some(vec!["lut".into()]), ..caps };
+        assert!(can_draw(&none, &resolved(&two)).unwrap_err().contains("shader \"simple\""));
+    }
+}
