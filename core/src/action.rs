@@ -21,11 +21,11 @@
 //!
 //! # Example
 //! ```
-//! use volact_core::{Appearance, Block, FrameDesc, Options, Registry, Shape, View};
-//! use volact_core::glam::DVec3;
+//! use volact_core::{Appearance, FrameDesc, Options, Registry, ScalarType, Shape, View, Volume, VolumeDesc};
 //!
 //! let registry = Registry::with_core();
-//! let shape = Shape::new(Block::new(DVec3::ZERO, DVec3::ONE)?, Appearance::new("none"));
+//! let volume = Volume::new(VolumeDesc::new([2, 2, 2], ScalarType::U8, 1), vec![255u8; 8])?;
+//! let shape = Shape::around(&volume, Appearance::new("simple"));
 //! let mut action = registry.action("null", &Options::default())?;
 //! action.manage(&shape)?;
 //! action.begin_draw(&FrameDesc::fit(&shape, View::Front, 8, 8))?;

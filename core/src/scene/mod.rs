@@ -23,7 +23,7 @@
 //! let problems = SceneFile::parse(text).unwrap_err();
 //! assert_eq!(problems.to_string(), "\
 //! 7:36: shapes[0].parameters.volume.data: found \"haed\", wanted a name under `data`: head; did you mean \"head\"?
-//! 8:75: shapes[0].parameters.lookup_table.opacity: found 1.5, wanted 0 to 1");
+//! 8:74: shapes[0].parameters.lookup_table.opacity: found 1.5, wanted 0 to 1");
 //! ```
 //!
 //! Nothing in a file can run, and a file that is huge, deeply nested or otherwise hostile ends in
