@@ -1,4 +1,33 @@
-//! The action `cpu`.
+//! The action `cpu`: f32 ray casting on all cores.
+//!
+//! - Midpoint lattice and exact exponential, or pre-integration where the table is too sharp for
+//!   the step and the data ([`sharp`]).
+//! - Sixteen rays at once on the widest vector unit found ([`simd`]); the same bits on every unit
+//!   and for any number of threads.
+//! - Transparent space is skipped ([`bounds`]) and rays end when nothing is left to see; neither
+//!   skipping nor its absence changes a bit.
+//! - What the vector kernels do not do (overlapping shapes, pre-interpolated tables, `simple`) is
+//!   drawn ray by ray in f64 ([`general`]).
+//!
+//! Geometries other than blocks are not drawn yet: an error says so.
+
+pub mod action;
+pub mod bounds;
+pub mod classify;
+pub mod dispatch;
+pub mod fetch;
+pub mod general;
+pub mod options;
+pub mod over;
+pub mod packet;
+pub mod preintegrate;
+pub mod reduce;
+pub mod resources;
+pub mod sharp;
+pub mod simd;
+pub mod walk;
+
+use std::sync::Arc;
 
 use volact_core::{Registry, registry::RegisterError};
 
@@ -6,6 +35,10 @@ use volact_core::{Registry, registry::RegisterError};
 ///
 /// # Errors
 /// If the name is taken.
-pub fn register(_registry: &mut Registry) -> Result<(), RegisterError> {
-    Ok(())
+pub fn register(registry: &mut Registry) -> Result<(), RegisterError> {
+    let factory = |context: &_, options: &_| {
+        let action: Box<dyn volact_core::RenderAction> = Box::new(action::CpuAction::new(context, options)?);
+        Ok(action)
+    };
+    registry.add_action(options::declaration(), Arc::new(factory))
 }

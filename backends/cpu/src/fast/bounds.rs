@@ -1,0 +1,298 @@
+//! Value bounds of blocks of voxels, and what can be skipped because of them.
+//!
+//! A block covers 4³ cells; its bounds include the one-voxel rim, so that every interpolated
+//! value inside lies within them. Bounds are kept in 8 bits, rounded outward over the data's
+//! range: at most two bytes for 64 voxels. From them and a table follows, for each block, how far
+//! (in blocks, any direction) everything is transparent.
+
+use super::fetch::Voxels;
+use volact_core::ScalarType;
+
+/// Cells of a block along each axis.
+pub const BLOCK: usize = 4;
+
+/// Bounds of all blocks.
+#[derive(Clone, Debug)]
+pub struct ValueBounds {
+    /// Blocks along each axis.
+    pub blocks: [usize; 3],
+    /// Lowest and highest finite number of the data ROI, as `Voxels::at` gives them; `None` if
+    /// there is none.
+    pub range: Option<[f32; 2]>,
+    /// Lower and upper bound of each block in steps of `range`/255, rounded outward; `[255, 0]`
+    /// where a block holds no number.
+    quantised: Vec<[u8; 2]>,
+    /// Whether numbers may be infinite: then the outermost steps have no outer end.
+    float: bool,
+}
+
+/// How far around each block nothing can be seen, in blocks: 0 where the block itself may be seen.
+#[derive(Clone, Debug)]
+pub struct Emptiness {
+    /// Blocks along each axis.
+    pub blocks: [usize; 3],
+    /// Chebyshev distance to the nearest block that may be seen, at most 255; padded by 4 bytes.
+    pub distance: Vec<u8>,
+}
+
+impl ValueBounds {
+    /// Reads all voxels of the data ROI once, on `threads` threads.
+    pub fn new(voxels: &Voxels<'_>, threads: usize) -> Self {
+        let cells: [usize; 3] = std::array::from_fn(|a| (voxels.max[a] - voxels.min[a]).max(1));
+        let blocks = cells.map(|n| n.div_ceil(BLOCK));
+        let slab = blocks[0] * blocks[1];
+        let float = voxels.scalar.is_float();
+        // One more, so that four bytes can be read at the last.
+        let mut quantised = vec![[255u8, 0]; slab * blocks[2] + 1];
+        let Some(range) = data_range(voxels, threads) else { return Self { blocks, range: None, quantised, float } };
+        let per_thread = blocks[2].div_ceil(threads.max(1));
+        std::thread::scope(|scope| {
+            for (i, part) in quantised[..slab * blocks[2]].chunks_mut(per_thread * slab).enumerate() {
+                scope.spawn(move || {
+                    for (j, layer) in part.chunks_mut(slab).enumerate() {
+                        bound_layer(voxels, blocks, i * per_thread + j, range, layer);
+                    }
+                });
+            }
+        });
+        Self { blocks, range: Some(range), quantised, float }
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        self.quantised.len() * 2
+    }
+
+    /// Lower and upper bound of a block in steps; the lower one above the upper where it is empty.
+    pub fn steps(&self) -> &[[u8; 2]] {
+        &self.quantised
+    }
+
+    /// The value of a step.
+    pub fn value(&self, step: u8) -> f32 {
+        let [lo, hi] = self.range.unwrap_or([0.0, 0.0]);
+        if self.float && (step == 0 || step == 255) {
+            return if step == 0 { f32::NEG_INFINITY } else { f32::INFINITY };
+        }
+        if step == 255 { hi } else { lo + (hi - lo) * (f32::from(step) / 255.0) }
+    }
+
+    /// Which blocks can be skipped, where `seen(lo, hi)` says whether any value of that interval
+    /// can be seen.
+    pub fn emptiness(&self, seen: impl Fn(f32, f32) -> bool) -> Emptiness {
+        // 256 × 256 intervals at most, found once each.
+        let mut known = vec![0u8; 1 << 16];
+        let mut distance = vec![0u8; self.quantised.len() - 1];
+        for (d, &[lo, hi]) in distance.iter_mut().zip(&self.quantised) {
+            let slot = &mut known[usize::from(lo) << 8 | usize::from(hi)];
+            if *slot == 0 {
+                *slot = if lo <= hi && seen(self.value(lo), self.value(hi)) { 1 } else { 2 };
+            }
+            *d = if *slot == 1 { 0 } else { 255 };
+        }
+        spread(&mut distance, self.blocks);
+        distance.extend([0; 4]);
+        Emptiness { blocks: self.blocks, distance }
+    }
+}
+
+impl Emptiness {
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        self.distance.len()
+    }
+
+    /// Whether there is anything to skip.
+    pub fn any(&self) -> bool {
+        self.distance.iter().any(|&d| d > 0)
+    }
+}
+
+/// Chebyshev distance transform: exact, because the unit ball is a product of intervals: one
+/// axis at a time, `d(i) = min over j of max(d(j), |i − j|)`, by a forward and a backward sweep
+/// of 1 + minimum over the 26 neighbours (Borgefors 1986, with all weights 1).
+fn spread(distance: &mut [u8], [nx, ny, nz]: [usize; 3]) {
+    let row = nx;
+    let slab = nx * ny;
+    let mut relax = |x: usize, y: usize, z: usize, forward: bool| {
+        let i = z * slab + y * row + x;
+        let mut best = distance[i];
+        if best == 0 {
+            return;
+        }
+        let mut look = |dx: isize, dy: isize, dz: isize| {
+            let (x, y, z) = (x as isize + dx, y as isize + dy, z as isize + dz);
+            if x >= 0 && y >= 0 && z >= 0 && x < nx as isize && y < ny as isize && z < nz as isize {
+                let v = distance[z as usize * slab + y as usize * row + x as usize];
+                best = best.min(v.saturating_add(1));
+            }
+        };
+        let s = if forward { -1 } else { 1 };
+        for dy in -1..=1 {
+            for dx in -1..=1 {
+                look(dx, dy, s);
+            }
+        }
+        for dx in -1..=1 {
+            look(dx, s, 0);
+        }
+        look(s, 0, 0);
+        distance[i] = best;
+    };
+    for z in 0..nz {
+        for y in 0..ny {
+            for x in 0..nx {
+                relax(x, y, z, true);
+            }
+        }
+    }
+    for z in (0..nz).rev() {
+        for y in (0..ny).rev() {
+            for x in (0..nx).rev() {
+                relax(x, y, z, false);
+            }
+        }
+    }
+}
+
+fn bound_layer(voxels: &Voxels<'_>, blocks: [usize; 3], bz: usize, [lo, hi]: [f32; 2], layer: &mut [[u8; 2]]) {
+    let mut raw = vec![[f32::INFINITY, f32::NEG_INFINITY]; layer.len()];
+    let span = |b: usize, a: usize| {
+        let first = voxels.min[a] + b * BLOCK;
+        first..=(first + BLOCK).min(voxels.max[a])
+    };
+    let mut columns = vec![[f32::INFINITY, f32::NEG_INFINITY]; voxels.max[0] - voxels.min[0] + 1];
+    for by in 0..blocks[1] {
+        columns.fill([f32::INFINITY, f32::NEG_INFINITY]);
+        for z in span(bz, 2) {
+            for y in span(by, 1) {
+                bound_row(voxels, y, z, &mut columns);
+            }
+        }
+        for bx in 0..blocks[0] {
+            let part = &columns[bx * BLOCK..=(bx * BLOCK + BLOCK).min(columns.len() - 1)];
+            let [a, b] = &mut raw[by * blocks[0] + bx];
+            for c in part {
+                *a = a.min(c[0]);
+                *b = b.max(c[1]);
+            }
+        }
+    }
+    let scale = if hi > lo { 255.0 / (f64::from(hi) - f64::from(lo)) } else { 0.0 };
+    for (q, [a, b]) in layer.iter_mut().zip(raw) {
+        if a <= b {
+            // A little wider than exact, so that rounding here or in an interpolation is inside.
+            let steps = |v: f32| (f64::from(v) - f64::from(lo)) * scale;
+            *q = [(steps(a) - 1e-4).floor().max(0.0) as u8, (steps(b) + 1e-4).ceil().min(255.0) as u8];
+        }
+    }
+}
+
+/// Runs `f` on every number of a row of the data ROI, with its column.
+macro_rules! each {
+    ($voxels:ident, $y:ident, $z:ident, |$x:ident, $v:ident| $body:expr) => {{
+        let v = $voxels;
+        let n = v.max[0] - v.min[0] + 1;
+        let start = (($z * v.dims[1] + $y) * v.dims[0] + v.min[0]) * v.components;
+        macro_rules! typed {
+            ($t:ty) => {{
+                let size = size_of::<$t>();
+                let bytes = &v.bytes[start * size..(start + n * v.components) * size];
+                if v.components == 1 {
+                    for ($x, raw) in bytes.chunks_exact(size).enumerate() {
+                        let $v = f32::from(<$t>::from_ne_bytes(raw.try_into().expect("chunk of that size")));
+                        $body
+                    }
+                } else {
+                    for ($x, raw) in bytes.chunks_exact(size * v.components).enumerate() {
+                        let raw = &raw[v.component * size..][..size];
+                        let $v = f32::from(<$t>::from_ne_bytes(raw.try_into().expect("chunk of that size")));
+                        $body
+                    }
+                }
+            }};
+        }
+        if v.origin == 0.0 && v.gain == 1.0 {
+            match v.scalar {
+                ScalarType::U8 => typed!(u8),
+                ScalarType::I8 => typed!(i8),
+                ScalarType::U16 => typed!(u16),
+                ScalarType::I16 => typed!(i16),
+                ScalarType::F32 => typed!(f32),
+                _ => each!(@slow v, n, $y, $z, |$x, $v| $body),
+            }
+        } else {
+            each!(@slow v, n, $y, $z, |$x, $v| $body)
+        }
+    }};
+    (@slow $voxels:ident, $n:ident, $y:ident, $z:ident, |$x:ident, $v:ident| $body:expr) => {
+        for $x in 0..$n {
+            let $v = $voxels.at($voxels.min[0] + $x, $y, $z);
+            $body
+        }
+    };
+}
+
+fn bound_row(voxels: &Voxels<'_>, y: usize, z: usize, columns: &mut [[f32; 2]]) {
+    each!(voxels, y, z, |x, v| {
+        let c = &mut columns[x];
+        // Comparisons are false for NaN, which is transparent and bounds nothing.
+        c[0] = if v < c[0] { v } else { c[0] };
+        c[1] = if v > c[1] { v } else { c[1] };
+    });
+}
+
+fn data_range(voxels: &Voxels<'_>, threads: usize) -> Option<[f32; 2]> {
+    let layers = voxels.max[2] - voxels.min[2] + 1;
+    let per_thread = layers.div_ceil(threads.max(1));
+    let part = |first: usize| {
+        let mut range = [f32::INFINITY, f32::NEG_INFINITY];
+        for z in first..(first + per_thread).min(layers) {
+            for y in voxels.min[1]..=voxels.max[1] {
+                let z = z + voxels.min[2];
+                let [mut a, mut b] = range;
+                each!(voxels, y, z, |_x, v| {
+                    let finite = v.is_finite();
+                    a = if finite && v < a { v } else { a };
+                    b = if finite && v > b { v } else { b };
+                });
+                range = [a, b];
+            }
+        }
+        range
+    };
+    let range = std::thread::scope(|scope| {
+        let part = &part;
+        let handles: Vec<_> = (0..layers).step_by(per_thread).map(|first| scope.spawn(move || part(first))).collect();
+        handles.into_iter().fold([f32::INFINITY, f32::NEG_INFINITY], |[a, b], h| {
+            let [c, d] = h.join().unwrap_or([f32::NEG_INFINITY, f32::INFINITY]);
+            [a.min(c), b.max(d)]
+        })
+    });
+    (range[0] <= range[1]).then_some(range)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn distance_is_chebyshev() {
+        let blocks = [7, 5, 6];
+        let mut distance = vec![255u8; 7 * 5 * 6];
+        let seeds = [[1usize, 1, 1], [6, 4, 5]];
+        for [x, y, z] in seeds {
+            distance[(z * 5 + y) * 7 + x] = 0;
+        }
+        spread(&mut distance, blocks);
+        for z in 0..6usize {
+            for y in 0..5usize {
+                for x in 0..7usize {
+                    let to = |s: [usize; 3]| x.abs_diff(s[0]).max(y.abs_diff(s[1])).max(z.abs_diff(s[2]));
+                    let wanted = seeds.map(to).into_iter().min().unwrap();
+                    assert_eq!(usize::from(distance[(z * 5 + y) * 7 + x]), wanted, "{x} {y} {z}");
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,241 @@
+//! Tables made for one sample distance: classification of whole segments.
+//!
+//! A [`SegmentTable`] holds, at equidistant values, what a whole segment of the lattice adds:
+//! opacity α = 1 − (1 − a)^(h/unit) and premultiplied colour. Its nodes fall on the control points
+//! wherever a grid of at most 2¹⁶ intervals can; it is refined until linear interpolation between
+//! nodes is within 1e-6 of the exact exponential, and [`SegmentTable::error`] says what was reached.
+
+use volact_core::table::ResolvedTable;
+
+/// Interpolation error that a table is refined to.
+const WANTED_ERROR: f64 = 1e-6;
+/// Most intervals that are tried.
+const MOST: usize = 1 << 16;
+/// Most intervals for accuracy alone.
+const ENOUGH: usize = 1 << 13;
+
+/// From the numbers that kernels fetch to data units, and back.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Units {
+    /// data = number × scale + offset.
+    pub scale: f64,
+    /// See `scale`.
+    pub offset: f64,
+}
+
+impl Units {
+    /// To data units.
+    pub fn data(&self, number: f64) -> f64 {
+        number * self.scale + self.offset
+    }
+
+    /// From data units.
+    pub fn number(&self, data: f64) -> f64 {
+        (data - self.offset) / self.scale
+    }
+}
+
+/// What a whole segment adds, by value.
+#[derive(Clone, Debug)]
+pub struct SegmentTable {
+    /// Premultiplied red, green, blue and opacity; after the last node its copy, then two
+    /// transparent entries.
+    pub entries: Vec<[f32; 4]>,
+    /// Number of nodes.
+    pub nodes: usize,
+    /// Node coordinate = number × scale + offset.
+    pub scale: f32,
+    /// See `scale`.
+    pub offset: f32,
+    /// Largest interpolation error found, in premultiplied colour or opacity.
+    pub error: f64,
+    /// First and last number on the grid.
+    pub domain: [f64; 2],
+    /// How many nodes up to each have any opacity at or just after them.
+    seen: Vec<u32>,
+}
+
+impl SegmentTable {
+    /// Tabulates `table` for segments of `h` unit distances, over those numbers that occur.
+    pub fn new(table: &ResolvedTable, units: Units, occurring: Option<[f64; 2]>, h: f64) -> Self {
+        let domain = domain(table, units, occurring);
+        let segment = |number: f64| segment(table.classify(units.data(number)), h);
+        let marks: Vec<f64> = table.points().iter().map(|p| units.number(p.value)).collect();
+        let base = aligned(&marks, domain);
+        let mut intervals = base.unwrap_or(1024);
+        while intervals < 256 && domain[0] < domain[1] {
+            intervals *= 2;
+        }
+        let (mut nodes, mut error) = tabulate(&segment, domain, intervals);
+        while error > WANTED_ERROR && intervals < ENOUGH {
+            intervals *= 2;
+            (nodes, error) = tabulate(&segment, domain, intervals);
+        }
+        Self::from_nodes(nodes, error, domain, |lo, hi| {
+            let (a, b) = (units.data(lo), units.data(hi));
+            table.max_opacity(a.min(b), a.max(b)) > 0.0
+        })
+    }
+
+    fn from_nodes(nodes: Vec<[f64; 4]>, error: f64, domain: [f64; 2], opaque: impl Fn(f64, f64) -> bool) -> Self {
+        let count = nodes.len();
+        let width = domain[1] - domain[0];
+        let scale = if count > 1 { (count - 1) as f64 / width } else { 0.0 };
+        let number = |i: usize| domain[0] + i as f64 / scale.max(f64::MIN_POSITIVE);
+        let mut seen = vec![0u32];
+        for i in 0..count {
+            let here = if count == 1 { nodes[0][3] > 0.0 } else { opaque(number(i), number((i + 1).min(count - 1))) };
+            seen.push(seen[i] + u32::from(here));
+        }
+        let mut entries: Vec<_> = nodes.iter().map(|e| e.map(|v| v as f32)).collect();
+        entries.extend([entries[count - 1], [0.0; 4], [0.0; 4]]);
+        let offset = (-domain[0] * scale) as f32;
+        Self { entries, nodes: count, scale: scale as f32, offset, error, domain, seen }
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        self.entries.len() * 16 + self.seen.len() * 4
+    }
+
+    /// Index of the transparent entry.
+    pub fn transparent(&self) -> usize {
+        self.nodes + 1
+    }
+
+    /// Node coordinate of a number, as the kernels compute it.
+    pub fn coordinate(&self, number: f32) -> f32 {
+        (number * self.scale + self.offset).max(0.0).min((self.nodes - 1) as f32)
+    }
+
+    /// Whether any number of an interval can be seen, through the interpolated table.
+    pub fn sees(&self, lo: f32, hi: f32) -> bool {
+        let node = |v: f32| self.coordinate(v) as usize;
+        let (first, last) = (node(lo), node(hi));
+        // An interval of nodes counts its own left end to its right neighbour; one more either
+        // way keeps rounding of coordinates inside.
+        let (first, last) = (first.saturating_sub(1), (last + 1).min(self.nodes - 1));
+        self.seen[last + 1] > self.seen[first]
+    }
+
+    /// What a whole segment adds at a number.
+    pub fn lookup(&self, number: f32) -> [f32; 4] {
+        if number.is_nan() {
+            return [0.0; 4];
+        }
+        let u = self.coordinate(number);
+        let i = u as usize;
+        let f = u - i as f32;
+        std::array::from_fn(|c| self.entries[i][c] + f * (self.entries[i + 1][c] - self.entries[i][c]))
+    }
+}
+
+/// Premultiplied colour and opacity of a segment of `h` unit distances.
+pub fn segment([r, g, b, a]: [f64; 4], h: f64) -> [f64; 4] {
+    let alpha = if a >= 1.0 { 1.0 } else { -(h * (-a).ln_1p()).exp_m1() };
+    [r * alpha, g * alpha, b * alpha, alpha]
+}
+
+/// The numbers over which the table varies and that occur; a single one where it does not vary.
+fn domain(table: &ResolvedTable, units: Units, occurring: Option<[f64; 2]>) -> [f64; 2] {
+    let points = table.points();
+    let ends = [points[0].value, points[points.len() - 1].value].map(|v| units.number(v));
+    let (mut lo, mut hi) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
+    if let Some([a, b]) = occurring {
+        // Keep the control points that enclose what occurs, so that nodes can fall on them.
+        let marks = || points.iter().map(|p| units.number(p.value));
+        let below = marks().filter(|&m| m <= a).fold(f64::NEG_INFINITY, f64::max);
+        let above = marks().filter(|&m| m >= b).fold(f64::INFINITY, f64::min);
+        let whole = |v: f64| v == v.round();
+        let clip = |end: f64, mark: f64| if whole(end) && marks().all(whole) || !mark.is_finite() { end } else { mark };
+        lo = lo.max(clip(a, below).min(hi));
+        hi = hi.min(clip(b, above).max(lo));
+    }
+    [lo, hi]
+}
+
+/// The fewest intervals over `domain` whose nodes meet all marks.
+fn aligned(marks: &[f64], [lo, hi]: [f64; 2]) -> Option<usize> {
+    if lo >= hi {
+        return Some(1);
+    }
+    let inner: Vec<f64> = marks.iter().filter(|&&m| lo < m && m < hi).map(|m| (m - lo) / (hi - lo)).collect();
+    let meets = |n: usize| {
+        let n = n as f64;
+        inner.iter().all(|m| (m * n - (m * n).round()).abs() < 1e-6)
+    };
+    let many = inner.len() + 1;
+    let candidates = [many].into_iter().chain(1..=ENOUGH).chain([(hi - lo) as usize]);
+    candidates.filter(|n| (1..=MOST).contains(n)).find(|&n| meets(n))
+}
+
+fn tabulate(segment: &impl Fn(f64) -> [f64; 4], [lo, hi]: [f64; 2], intervals: usize) -> (Vec<[f64; 4]>, f64) {
+    if lo >= hi {
+        return (vec![segment(lo)], 0.0);
+    }
+    let at = |i: f64| {
+        let t = i / intervals as f64;
+        lo * (1.0 - t) + hi * t
+    };
+    let nodes: Vec<[f64; 4]> = (0..=intervals).map(|i| segment(at(i as f64))).collect();
+    let mut error = 0f64;
+    for (i, pair) in nodes.windows(2).enumerate() {
+        let exact = segment(at(i as f64 + 0.5));
+        for c in 0..4 {
+            error = error.max((exact[c] - 0.5 * (pair[0][c] + pair[1][c])).abs());
+        }
+    }
+    (nodes, error)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use volact_core::{ControlPoint, LookupTable};
+
+    fn table(points: &[(f64, f64)]) -> ResolvedTable {
+        let point = |&(value, opacity): &(f64, f64)| ControlPoint { value, color: [1.0, 0.5, 0.0], opacity };
+        LookupTable::from_points(points.iter().map(point).collect::<Vec<_>>()).unwrap().resolve([0.0, 1.0])
+    }
+
+    const PLAIN: Units = Units { scale: 1.0, offset: 0.0 };
+
+    #[test]
+    fn nodes_fall_on_control_points() {
+        let t = table(&[(0.0, 0.0), (70.0, 0.0), (128.0, 0.03), (150.0, 0.002), (255.0, 0.1)]);
+        let s = SegmentTable::new(&t, PLAIN, Some([0.0, 255.0]), 1.0);
+        assert_eq!((s.nodes - 1) % 255, 0);
+        for p in t.points() {
+            let got = s.lookup(p.value as f32)[3];
+            assert!((f64::from(got) - p.opacity).abs() < 1e-7, "{p:?} {got}");
+        }
+        assert!(s.error < 1e-6);
+    }
+
+    #[test]
+    fn zero_stays_exactly_zero_and_is_not_seen() {
+        let t = table(&[(0.0, 0.0), (70.0, 0.0), (128.0, 0.5), (255.0, 0.0)]);
+        let s = SegmentTable::new(&t, PLAIN, Some([0.0, 255.0]), 0.3);
+        assert!(!s.sees(0.0, 68.0));
+        assert!(s.sees(0.0, 71.0));
+        assert!(s.sees(200.0, 254.9));
+        assert_eq!(s.lookup(68.9), [0.0; 4]);
+        assert_eq!(s.lookup(f32::NAN), [0.0; 4]);
+    }
+
+    #[test]
+    fn opacity_scales_with_the_segment() {
+        let t = table(&[(0.0, 0.0), (100.0, 1.0)]);
+        let s = SegmentTable::new(&t, PLAIN, None, 2.0);
+        assert!((s.lookup(50.0)[3] - 0.75).abs() < 2e-6);
+        assert_eq!(s.lookup(100.0)[3], 1.0);
+    }
+
+    #[test]
+    fn slope_below_zero_is_right() {
+        let t = table(&[(-10.0, 0.0), (10.0, 0.8)]);
+        let units = Units { scale: -1.0, offset: 0.0 };
+        let s = SegmentTable::new(&t, units, None, 1.0);
+        assert!((s.lookup(5.0)[3] - 0.2).abs() < 1e-6);
+    }
+}

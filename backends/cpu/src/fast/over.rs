@@ -1,0 +1,441 @@
+//! Emission and absorption of one shape, front to back, sixteen rays at once.
+//!
+//! Whole segments are looked up in a table made for the sample distance; the cut segments at the
+//! ends of a ray's interval take the power of their true length.
+#![expect(unsafe_code, reason = "kernels of a vector unit")]
+
+use volact_core::lattice::{Lattice, Segment};
+
+use super::{
+    bounds::Emptiness,
+    classify::SegmentTable,
+    fetch::{Base, Fetch, Voxels},
+    packet::Packet,
+    preintegrate::SegmentPairs,
+    simd::{LANES, Simd},
+    walk::{ALL, CHUNK, Counts, Kernel, walk},
+};
+
+/// One shape to draw.
+#[derive(Clone, Copy, Debug)]
+pub struct Job<'a> {
+    /// Its voxels.
+    pub voxels: Voxels<'a>,
+    /// The frame's lattice.
+    pub lattice: Lattice,
+    /// What whole segments add, by the value in their middle.
+    pub table: &'a SegmentTable,
+    /// What they add by the values at their ends; used where there is one.
+    pub pairs: Option<&'a SegmentPairs>,
+    /// What can be skipped.
+    pub empty: Option<&'a Emptiness>,
+    /// Rays end where less than this is left to see.
+    pub termination: f32,
+    /// Opacity at which depth is taken.
+    pub threshold: f32,
+}
+
+/// What came of a packet.
+#[derive(Clone, Debug)]
+pub struct Pixels {
+    /// Premultiplied RGBA.
+    pub color: [[f32; 4]; LANES],
+    /// `t` at which the threshold is reached.
+    pub depth: [f64; LANES],
+}
+
+impl Default for Pixels {
+    fn default() -> Self {
+        Self { color: [[0.0; 4]; LANES], depth: [f64::INFINITY; LANES] }
+    }
+}
+
+/// Draws a packet.
+///
+/// # Safety
+/// Called from a function compiled for `S` on a machine that has it; `F` is the voxels' access.
+#[inline(always)]
+pub unsafe fn draw<S: Simd, F: Fetch>(job: &Job<'_>, packet: &Packet, counts: &mut Counts) -> Pixels {
+    let mut pixels = Pixels::default();
+    let cuts = packet.split(&job.lattice);
+    counts.rays += u64::from(packet.active.count_ones());
+    counts.lattice += (0..LANES).map(|l| (cuts.to[l] - cuts.from[l]).max(0) as u64).sum::<u64>();
+    let blocks = job.empty.map(|e| e.blocks);
+    // SAFETY: the caller's promises.
+    unsafe {
+        ends::<S, F>(job, packet, &cuts.first, !ALL, &mut pixels, counts);
+        let step = job.lattice.step;
+        let done = if let Some(pairs) = job.pairs {
+            let mut kernel = PairKernel::<S>::new(job, pairs, &mut pixels);
+            walk::<S, F, _>(&mut kernel, &job.voxels, packet, &cuts, step, blocks, 0, counts);
+            kernel.shared.finish()
+        } else {
+            let mut kernel = SampleKernel::<S>::new(job, &mut pixels);
+            walk::<S, F, _>(&mut kernel, &job.voxels, packet, &cuts, step, blocks, 0, counts);
+            kernel.shared.finish()
+        };
+        ends::<S, F>(job, packet, &cuts.last, done, &mut pixels, counts);
+    }
+    pixels
+}
+
+/// Adds the cut segments of all lanes that are not done.
+#[inline(always)]
+unsafe fn ends<S: Simd, F: Fetch>(
+    job: &Job<'_>,
+    packet: &Packet,
+    cut: &[Option<Segment>; LANES],
+    done: u32,
+    pixels: &mut Pixels,
+    counts: &mut Counts,
+) {
+    let wanted = |l: &usize| cut[*l].is_some() && (done >> *l & 1 == 0 || done == !ALL);
+    let Some(lead) = (0..LANES).find(wanted) else { return };
+    // SAFETY: the caller's promises.
+    unsafe {
+        let entries = if let Some(pairs) = job.pairs {
+            let front = numbers::<S, F>(job, packet, lead, |l| cut[l].map(|s| s.start));
+            let back = numbers::<S, F>(job, packet, lead, |l| cut[l].map(|s| s.end));
+            std::array::from_fn(|l| pairs.lookup(front[l], back[l]))
+        } else {
+            let middle = numbers::<S, F>(job, packet, lead, |l| cut[l].map(|s| s.middle()));
+            middle.map(|v| job.table.lookup(v))
+        };
+        for l in (0..LANES).filter(wanted) {
+            let Some(segment) = cut[l] else { continue };
+            counts.samples += 1;
+            counts.lattice += 1;
+            let share = (segment.length() / job.lattice.step) as f32;
+            let before = pixels.color[l][3];
+            let add = power(entries[l], share);
+            pixels.color[l] = under(pixels.color[l], add);
+            if before < job.threshold && pixels.color[l][3] >= job.threshold {
+                let part = part_of(before, add[3], job.threshold);
+                pixels.depth[l] = segment.start + segment.length() * f64::from(part);
+            }
+        }
+    }
+}
+
+/// The numbers at one `t` a lane.
+#[inline(always)]
+unsafe fn numbers<S: Simd, F: Fetch>(
+    job: &Job<'_>,
+    packet: &Packet,
+    lead: usize,
+    t: impl Fn(usize) -> Option<f64>,
+) -> [f32; LANES] {
+    let base = Base::new(&job.voxels, packet.at(lead, t(lead).unwrap_or(0.0)));
+    let mut p = [[0f32; LANES]; 3];
+    for l in 0..LANES {
+        let at = packet.at(l, t(l).unwrap_or(0.0));
+        for a in 0..3 {
+            p[a][l] = (at[a] - f64::from(base.at[a])) as f32;
+        }
+    }
+    let mut out = [0f32; LANES];
+    // SAFETY: the caller's promises.
+    unsafe {
+        let p = [S::load(&p[0]), S::load(&p[1]), S::load(&p[2])];
+        S::store(F::fetch::<S>(&job.voxels, &base, p), &mut out);
+    }
+    out
+}
+
+/// What a share of a segment adds, given what a whole one does: 1 − (1 − α)^share.
+pub fn power(whole: [f32; 4], share: f32) -> [f32; 4] {
+    let a = whole[3];
+    if a <= 0.0 || a >= 1.0 {
+        return whole;
+    }
+    let alpha = if a < 0.02 {
+        // The binomial series, exact to f32 here.
+        let (s, x) = (share, a);
+        s * x * (1.0 + (1.0 - s) / 2.0 * x * (1.0 + (2.0 - s) / 3.0 * x * (1.0 + (3.0 - s) / 4.0 * x)))
+    } else {
+        -(share * (-a).ln_1p()).exp_m1()
+    };
+    let scale = alpha / a;
+    [whole[0] * scale, whole[1] * scale, whole[2] * scale, alpha]
+}
+
+/// c + (1 − c.a)·e.
+pub fn under(c: [f32; 4], e: [f32; 4]) -> [f32; 4] {
+    let left = 1.0 - c[3];
+    std::array::from_fn(|i| c[i] + left * e[i])
+}
+
+/// The part of a segment of opacity `alpha` behind opacity `before` after which `threshold` is
+/// reached.
+pub fn part_of(before: f32, alpha: f32, threshold: f32) -> f32 {
+    if alpha >= 1.0 {
+        return 0.0;
+    }
+    let needed = ((1.0 - threshold) / (1.0 - before)).ln();
+    (needed / (-alpha).ln_1p()).clamp(0.0, 1.0)
+}
+
+/// Colours, depths and the end of rays, for both kernels.
+struct Shared<'a, S: Simd> {
+    job: &'a Job<'a>,
+    pixels: &'a mut Pixels,
+    color: S::Quads,
+    before: [f32; LANES],
+    done: u32,
+    /// Lanes whose depth is known.
+    reached: u32,
+}
+
+impl<'a, S: Simd> Shared<'a, S> {
+    #[inline(always)]
+    unsafe fn new(job: &'a Job<'a>, pixels: &'a mut Pixels) -> Self {
+        let before = pixels.color.map(|c| c[3]);
+        let reached = (0..LANES).fold(0, |bits, l| bits | u32::from(before[l] >= job.threshold) << l);
+        // SAFETY: the caller's promises.
+        let color = unsafe { S::load_quads(&pixels.color) };
+        Self { job, pixels, color, before, done: 0, reached }
+    }
+
+    /// Ends a chunk; `depth(lane, opacity before)` finds where the threshold was reached.
+    #[inline(always)]
+    unsafe fn end(&mut self, depth: impl Fn(usize, f32) -> f64) -> u32 {
+        // SAFETY: the caller's promises.
+        unsafe { S::store_quads(self.color, &mut self.pixels.color) };
+        for l in 0..LANES {
+            let opacity = self.pixels.color[l][3];
+            if opacity >= self.job.threshold && self.reached >> l & 1 == 0 {
+                self.reached |= 1 << l;
+                self.pixels.depth[l] = depth(l, self.before[l]);
+            }
+            if 1.0 - opacity < self.job.termination {
+                self.done |= 1 << l;
+            }
+            self.before[l] = opacity;
+        }
+        self.done
+    }
+
+    #[inline(always)]
+    unsafe fn finish(self) -> u32 {
+        // SAFETY: the caller's promises.
+        unsafe { S::store_quads(self.color, &mut self.pixels.color) };
+        self.done
+    }
+}
+
+/// Finds where a lane reached the threshold among the rows of a chunk.
+fn find_depth(
+    rows: usize,
+    row_of: &[u8; CHUNK],
+    entry: impl Fn(usize) -> f32,
+    mut opacity: f32,
+    job: &Job<'_>,
+    first: i64,
+) -> f64 {
+    for i in 0..rows {
+        let alpha = entry(i);
+        let after = opacity + (1.0 - opacity) * alpha;
+        if after >= job.threshold {
+            let part = f64::from(part_of(opacity, alpha, job.threshold));
+            return ((first + i64::from(row_of[i])) as f64 + part) * job.lattice.step;
+        }
+        opacity = after;
+    }
+    // Rounding of the vector unit's order cannot differ from this one; the last row it is.
+    ((first + i64::from(row_of[rows.saturating_sub(1)])) as f64 + 1.0) * job.lattice.step
+}
+
+/// Classification at the middle of each segment.
+struct SampleKernel<'a, S: Simd> {
+    shared: Shared<'a, S>,
+    rows: usize,
+    row_of: [u8; CHUNK],
+    index: [[i32; LANES]; CHUNK],
+    fraction: [[f32; LANES]; CHUNK],
+}
+
+impl<'a, S: Simd> SampleKernel<'a, S> {
+    #[inline(always)]
+    unsafe fn new(job: &'a Job<'a>, pixels: &'a mut Pixels) -> Self {
+        // SAFETY: the caller's promises.
+        let shared = unsafe { Shared::new(job, pixels) };
+        Self { shared, rows: 0, row_of: [0; CHUNK], index: [[0; LANES]; CHUNK], fraction: [[0.0; LANES]; CHUNK] }
+    }
+}
+
+impl<S: Simd> Kernel<S> for SampleKernel<'_, S> {
+    const AT: f64 = 0.5;
+
+    #[inline(always)]
+    unsafe fn start(&mut self, _: S::F) {}
+
+    #[inline(always)]
+    unsafe fn take(&mut self, value: S::F, live: u32, row: usize) {
+        let job = self.shared.job;
+        let table = job.table;
+        // SAFETY: the caller's promises.
+        unsafe {
+            let live = if job.voxels.scalar.is_float() { live & !S::nan_bits(value) } else { live };
+            let (node, fraction) = node::<S>(value, table.scale, table.offset, table.nodes);
+            let index = S::shl::<4>(node);
+            let index = S::select_int(live, index, S::splat_int(16 * table.transparent() as i32));
+            S::store_int(index, &mut self.index[self.rows]);
+            S::store(fraction, &mut self.fraction[self.rows]);
+        }
+        self.row_of[self.rows] = row as u8;
+        self.rows += 1;
+    }
+
+    #[inline(always)]
+    unsafe fn end(&mut self, first: i64) -> u32 {
+        let entries = &self.shared.job.table.entries;
+        let (index, fraction, row_of, rows) = (&self.index, &self.fraction, &self.row_of, self.rows);
+        // SAFETY: indices lie in the table, which has an entry after each.
+        unsafe {
+            let mut color = self.shared.color;
+            for i in 0..rows {
+                color = S::under(color, entries.as_ptr().cast(), &index[i], &fraction[i]);
+            }
+            self.shared.color = color;
+            let job = self.shared.job;
+            self.rows = 0;
+            self.shared.end(|l, before| {
+                let alpha = |i: usize| {
+                    let at = index[i][l] as usize / 16;
+                    let (a, b) = (entries[at][3], entries[at + 1][3]);
+                    a + fraction[i][l] * (b - a)
+                };
+                find_depth(rows, row_of, alpha, before, job, first)
+            })
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn clear(&self, block: S::I) -> Option<S::F> {
+        // SAFETY: the caller's promises.
+        unsafe { distance::<S>(self.shared.job, block) }
+    }
+}
+
+/// Node and fraction of a number.
+#[inline(always)]
+unsafe fn node<S: Simd>(value: S::F, scale: f32, offset: f32, nodes: usize) -> (S::I, S::F) {
+    // SAFETY: the caller's promises.
+    unsafe {
+        let u = S::add(S::mul(value, S::splat(scale)), S::splat(offset));
+        let u = S::min(S::max(u, S::splat(0.0)), S::splat((nodes - 1) as f32));
+        let i = S::to_int(u);
+        (i, S::sub(u, S::to_float(i)))
+    }
+}
+
+#[inline(always)]
+unsafe fn distance<S: Simd>(job: &Job<'_>, block: S::I) -> Option<S::F> {
+    let empty = job.empty?;
+    // SAFETY: block indices are inside, and the map is padded by four bytes.
+    unsafe { Some(S::to_float(S::and_int(S::gather(empty.distance.as_ptr(), block), S::splat_int(255)))) }
+}
+
+/// Pre-integrated classification by the numbers at both ends of each segment.
+struct PairKernel<'a, S: Simd> {
+    shared: Shared<'a, S>,
+    pairs: &'a SegmentPairs,
+    rows: usize,
+    row_of: [u8; CHUNK],
+    index: [[i32; LANES]; CHUNK],
+    front: [[f32; LANES]; CHUNK],
+    back: [[f32; LANES]; CHUNK],
+    last: (S::I, S::F),
+    last_nan: u32,
+}
+
+impl<'a, S: Simd> PairKernel<'a, S> {
+    #[inline(always)]
+    unsafe fn new(job: &'a Job<'a>, pairs: &'a SegmentPairs, pixels: &'a mut Pixels) -> Self {
+        let zero = [[0.0; LANES]; CHUNK];
+        // SAFETY: the caller's promises.
+        unsafe {
+            Self {
+                shared: Shared::new(job, pixels),
+                pairs,
+                rows: 0,
+                row_of: [0; CHUNK],
+                index: [[0; LANES]; CHUNK],
+                front: zero,
+                back: zero,
+                last: (S::splat_int(0), S::splat(0.0)),
+                last_nan: 0,
+            }
+        }
+    }
+}
+
+impl<S: Simd> Kernel<S> for PairKernel<'_, S> {
+    const AT: f64 = 0.0;
+
+    #[inline(always)]
+    unsafe fn start(&mut self, value: S::F) {
+        let pairs = self.pairs;
+        // SAFETY: the caller's promises.
+        unsafe {
+            self.last = node::<S>(value, pairs.scale, pairs.offset, pairs.nodes);
+            self.last_nan = S::nan_bits(value);
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn take(&mut self, value: S::F, live: u32, row: usize) {
+        let pairs = self.pairs;
+        let stride = pairs.stride() as i32;
+        // SAFETY: the caller's promises.
+        unsafe {
+            let nan = S::nan_bits(value);
+            let live = live & !nan & !self.last_nan;
+            let (i, f) = self.last;
+            let (j, g) = node::<S>(value, pairs.scale, pairs.offset, pairs.nodes);
+            let index = S::shl::<4>(S::add_int(S::mul_int(i, S::splat_int(stride)), j));
+            let nothing = 16 * (pairs.nodes as i32 + 1) * stride;
+            S::store_int(S::select_int(live, index, S::splat_int(nothing)), &mut self.index[self.rows]);
+            S::store(f, &mut self.front[self.rows]);
+            S::store(g, &mut self.back[self.rows]);
+            self.last = (j, g);
+            self.last_nan = nan;
+        }
+        self.row_of[self.rows] = row as u8;
+        self.rows += 1;
+    }
+
+    #[inline(always)]
+    unsafe fn end(&mut self, first: i64) -> u32 {
+        let pairs = self.pairs;
+        let (index, front, back, row_of, rows) = (&self.index, &self.front, &self.back, &self.row_of, self.rows);
+        // SAFETY: indices lie in the table, which has an entry and a row after each.
+        unsafe {
+            let mut color = self.shared.color;
+            let table = pairs.entries.as_ptr().cast();
+            for i in 0..rows {
+                color = S::under_pairs(color, table, 16 * pairs.stride(), &index[i], &front[i], &back[i]);
+            }
+            self.shared.color = color;
+            let job = self.shared.job;
+            self.rows = 0;
+            self.shared.end(|l, before| {
+                let alpha = |i: usize| {
+                    let at = index[i][l] as usize / 16;
+                    let e = |at: usize| pairs.entries[at][3];
+                    let mix = |a: f32, b: f32, t: f32| a + t * (b - a);
+                    let x = mix(e(at), e(at + 1), back[i][l]);
+                    let y = mix(e(at + pairs.stride()), e(at + pairs.stride() + 1), back[i][l]);
+                    mix(x, y, front[i][l])
+                };
+                find_depth(rows, row_of, alpha, before, job, first)
+            })
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn clear(&self, block: S::I) -> Option<S::F> {
+        // SAFETY: the caller's promises.
+        unsafe { distance::<S>(self.shared.job, block) }
+    }
+}

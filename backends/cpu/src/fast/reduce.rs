@@ -1,0 +1,256 @@
+//! Maximum, minimum and mean of the value along a ray's interval, sixteen rays at once.
+#![expect(unsafe_code, reason = "kernels of a vector unit")]
+
+use volact_core::{Compositing, lattice::Lattice};
+
+use super::{
+    bounds::{Emptiness, ValueBounds},
+    fetch::{Base, Fetch, Voxels},
+    packet::Packet,
+    simd::{LANES, Simd},
+    walk::{CHUNK, Counts, Kernel, walk},
+};
+
+/// One shape to reduce.
+#[derive(Clone, Copy, Debug)]
+pub struct Job<'a> {
+    /// Its voxels.
+    pub voxels: Voxels<'a>,
+    /// The frame's lattice.
+    pub lattice: Lattice,
+    /// Maximum, minimum, average or add.
+    pub compositing: Compositing,
+    /// Bounds of blocks, to skip what cannot change a maximum or minimum.
+    pub bounds: Option<&'a ValueBounds>,
+    /// Blocks that are zero throughout, to skip where values are added.
+    pub empty: Option<&'a Emptiness>,
+}
+
+/// What came of a ray.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Reduced {
+    /// The extreme number, or the integral of the number over world length.
+    pub value: f64,
+    /// World length over which there was a number; 0 for a ray that met none.
+    pub length: f64,
+}
+
+/// Reduces a packet.
+///
+/// # Safety
+/// Called from a function compiled for `S` on a machine that has it; `F` is the voxels' access.
+#[inline(always)]
+pub unsafe fn reduce<S: Simd, F: Fetch>(job: &Job<'_>, packet: &Packet, counts: &mut Counts) -> [Reduced; LANES] {
+    let cuts = packet.split(&job.lattice);
+    counts.rays += u64::from(packet.active.count_ones());
+    counts.lattice += (0..LANES).map(|l| (cuts.to[l] - cuts.from[l]).max(0) as u64).sum::<u64>();
+    let step = job.lattice.step;
+    let mut out = [Reduced::default(); LANES];
+    // The cut segments first: a maximum does not mind, a sum neither.
+    for cut in [&cuts.first, &cuts.last] {
+        for l in 0..LANES {
+            if let Some(s) = cut[l] {
+                counts.samples += 1;
+                counts.lattice += 1;
+                // SAFETY: the caller's promises.
+                let number = unsafe { number::<S, F>(job, packet, l, s.middle()) };
+                merge(&mut out[l], job.compositing, number, s.length());
+            }
+        }
+    }
+    // SAFETY: the caller's promises.
+    unsafe {
+        match job.compositing {
+            Compositing::Maximum | Compositing::Minimum => {
+                let mut kernel = Extreme::<S>::new(job, &out);
+                let blocks = job.bounds.map(|b| b.blocks);
+                walk::<S, F, _>(&mut kernel, &job.voxels, packet, &cuts, step, blocks, 0, counts);
+                kernel.finish(&mut out);
+            }
+            _ => {
+                let mut kernel = Sum::<S>::new(job);
+                let blocks = job.empty.map(|e| e.blocks);
+                walk::<S, F, _>(&mut kernel, &job.voxels, packet, &cuts, step, blocks, 0, counts);
+                for l in 0..LANES {
+                    let whole = (cuts.to[l] - cuts.from[l]).max(0) as f64 - f64::from(kernel.missing[l]);
+                    out[l].value += kernel.total[l] * step;
+                    out[l].length += whole * step;
+                }
+            }
+        }
+    }
+    out
+}
+
+fn merge(into: &mut Reduced, compositing: Compositing, number: f32, length: f64) {
+    if number.is_nan() {
+        return;
+    }
+    let number = f64::from(number);
+    let first = into.length == 0.0;
+    into.value = match compositing {
+        Compositing::Maximum if first => number,
+        Compositing::Minimum if first => number,
+        Compositing::Maximum => into.value.max(number),
+        Compositing::Minimum => into.value.min(number),
+        _ => into.value + number * length,
+    };
+    into.length += length;
+}
+
+#[inline(always)]
+unsafe fn number<S: Simd, F: Fetch>(job: &Job<'_>, packet: &Packet, lane: usize, t: f64) -> f32 {
+    let at = packet.at(lane, t);
+    let base = Base::new(&job.voxels, at);
+    let local = |a: usize| (at[a] - f64::from(base.at[a])) as f32;
+    let mut out = [0f32; LANES];
+    // SAFETY: the caller's promises.
+    unsafe {
+        let p = [S::splat(local(0)), S::splat(local(1)), S::splat(local(2))];
+        S::store(F::fetch::<S>(&job.voxels, &base, p), &mut out);
+    }
+    out[0]
+}
+
+/// Maximum; a minimum is the maximum of the negated numbers.
+struct Extreme<'a, S: Simd> {
+    job: &'a Job<'a>,
+    sign: f32,
+    best: S::F,
+    /// The number that cannot be passed.
+    limit: f32,
+}
+
+impl<'a, S: Simd> Extreme<'a, S> {
+    #[inline(always)]
+    unsafe fn new(job: &'a Job<'a>, ends: &[Reduced; LANES]) -> Self {
+        let sign = if job.compositing == Compositing::Maximum { 1.0 } else { -1.0 };
+        let best = ends.map(|e| if e.length > 0.0 { sign * e.value as f32 } else { f32::NEG_INFINITY });
+        let range = job.bounds.and_then(|b| b.range).filter(|_| !job.voxels.scalar.is_float());
+        let limit = range.map_or(f32::INFINITY, |[lo, hi]| if sign > 0.0 { hi } else { -lo });
+        // SAFETY: the caller's promises.
+        unsafe { Self { job, sign, best: S::load(&best), limit } }
+    }
+
+    #[inline(always)]
+    unsafe fn finish(self, out: &mut [Reduced; LANES]) {
+        let mut best = [0f32; LANES];
+        // SAFETY: the caller's promises.
+        unsafe { S::store(self.best, &mut best) };
+        for l in 0..LANES {
+            if best[l] > f32::NEG_INFINITY {
+                out[l] = Reduced { value: f64::from(self.sign * best[l]), length: 1.0 };
+            }
+        }
+    }
+}
+
+impl<S: Simd> Kernel<S> for Extreme<'_, S> {
+    const AT: f64 = 0.5;
+
+    #[inline(always)]
+    unsafe fn start(&mut self, _: S::F) {}
+
+    #[inline(always)]
+    unsafe fn take(&mut self, value: S::F, live: u32, _: usize) {
+        // SAFETY: the caller's promises.
+        unsafe {
+            // `max` gives its second argument where the first is NaN.
+            let value = S::mul(value, S::splat(self.sign));
+            self.best = S::select(live, S::max(value, self.best), self.best);
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn end(&mut self, _: i64) -> u32 {
+        // SAFETY: the caller's promises.
+        unsafe { !S::lt_bits(self.best, S::splat(self.limit)) & super::walk::ALL }
+    }
+
+    #[inline(always)]
+    unsafe fn clear(&self, block: S::I) -> Option<S::F> {
+        let bounds = self.job.bounds?;
+        let [lo, hi] = bounds.range?;
+        // SAFETY: block indices are inside, and the list is padded by two bytes.
+        unsafe {
+            let pair = S::gather(bounds.steps().as_ptr().cast(), S::shl::<1>(block));
+            let low = S::to_float(S::and_int(pair, S::splat_int(255)));
+            let high = S::to_float(S::and_int(S::shr::<8>(pair), S::splat_int(255)));
+            let step = (hi - lo) / 255.0;
+            // A block can be passed where even its bound, half a step wider, is not better.
+            let bound = if self.sign > 0.0 {
+                S::add(S::mul(S::add(high, S::splat(0.5)), S::splat(step)), S::splat(lo))
+            } else {
+                S::sub(S::mul(S::sub(S::splat(0.5), low), S::splat(step)), S::splat(lo))
+            };
+            let worse = S::lt_bits(bound, self.best);
+            Some(S::select(worse, S::splat(1.0), S::splat(0.0)))
+        }
+    }
+}
+
+/// Sum over whole segments.
+struct Sum<'a, S: Simd> {
+    job: &'a Job<'a>,
+    chunk: S::F,
+    total: [f64; LANES],
+    missing: [u32; LANES],
+    rows: usize,
+}
+
+impl<'a, S: Simd> Sum<'a, S> {
+    #[inline(always)]
+    unsafe fn new(job: &'a Job<'a>) -> Self {
+        // SAFETY: the caller's promises.
+        let chunk = unsafe { S::splat(0.0) };
+        Self { job, chunk, total: [0.0; LANES], missing: [0; LANES], rows: 0 }
+    }
+}
+
+impl<S: Simd> Kernel<S> for Sum<'_, S> {
+    const AT: f64 = 0.5;
+
+    #[inline(always)]
+    unsafe fn start(&mut self, _: S::F) {}
+
+    #[inline(always)]
+    unsafe fn take(&mut self, value: S::F, live: u32, _: usize) {
+        // SAFETY: the caller's promises.
+        unsafe {
+            let mut live = live;
+            if self.job.voxels.scalar.is_float() {
+                let nan = S::nan_bits(value) & live;
+                live &= !nan;
+                for l in 0..LANES {
+                    self.missing[l] += nan >> l & 1;
+                }
+            }
+            let zero = S::splat(0.0);
+            self.chunk = S::add(self.chunk, S::select(live, value, zero));
+            self.rows += 1;
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn end(&mut self, _: i64) -> u32 {
+        let mut sum = [0f32; LANES];
+        debug_assert!(self.rows <= CHUNK);
+        self.rows = 0;
+        // SAFETY: the caller's promises.
+        unsafe {
+            S::store(self.chunk, &mut sum);
+            self.chunk = S::splat(0.0);
+        }
+        for l in 0..LANES {
+            self.total[l] += f64::from(sum[l]);
+        }
+        0
+    }
+
+    #[inline(always)]
+    unsafe fn clear(&self, block: S::I) -> Option<S::F> {
+        let empty = self.job.empty?;
+        // SAFETY: block indices are inside, and the map is padded by four bytes.
+        unsafe { Some(S::to_float(S::and_int(S::gather(empty.distance.as_ptr(), block), S::splat_int(255)))) }
+    }
+}
