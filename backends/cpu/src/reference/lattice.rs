@@ -1,0 +1,199 @@
+//! Another action's lattice in f64: what it would draw without rounding, formats and filters.
+//!
+//! Segments are those of [`volact_core::lattice`], counted along the ray or, for planes, along
+//! the view axis. Post-interpolated classification takes the value at each segment's middle and
+//! the exact exponential of its true length. Pre-integrated classification (K. Engel, M. Kraus,
+//! T. Ertl, *High-quality pre-integrated volume rendering*, 2001) takes the value as linear
+//! between the segment's ends and integrates the table exactly, attenuation inside included.
+
+use volact_core::{
+    Ray,
+    glam::DVec3,
+    lattice::{Lattice, Segment},
+};
+
+use super::{
+    cells::Cell,
+    cubic,
+    flat::Gather,
+    line::Line,
+    march::Light,
+    medium::{Medium, Voxels},
+    piece::{Cutter, Piece},
+};
+
+/// How segments are counted on a ray.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Counting {
+    lattice: Lattice,
+    /// The lattice's coordinate is `offset + scale·t`.
+    offset: f64,
+    scale: f64,
+}
+
+impl Counting {
+    /// Along the ray.
+    pub fn rays(step: f64) -> Self {
+        Self { lattice: Lattice { step }, offset: 0.0, scale: 1.0 }
+    }
+
+    /// Along the view axis, from the eye or the plane through the world's origin.
+    pub fn planes(step: f64, ray: &Ray, axis: DVec3, eye: Option<DVec3>) -> Self {
+        let zero = eye.unwrap_or(DVec3::ZERO);
+        let offset = axis.dot(ray.origin - zero);
+        Self { lattice: Lattice { step }, offset, scale: axis.dot(ray.direction) }
+    }
+
+    /// The segments of a line with their ends in the line's own `t`, and their numbers.
+    pub fn segments(&self, line: &Line) -> impl Iterator<Item = Segment> {
+        let Self { offset, scale, .. } = *self;
+        let there = |t: f64| offset + scale * (line.anchor + t);
+        let anchor = line.anchor;
+        let back = move |z: f64| (z - offset) / scale - anchor;
+        let place = move |s: Segment| Segment { k: s.k, start: back(s.start), end: back(s.end) };
+        self.lattice.segments(there(line.t[0]), there(line.t[1])).map(place)
+    }
+}
+
+/// The fields' values at a point; `None` where a NaN sample has weight.
+pub(super) fn sample(medium: &Medium, voxels: &Voxels<'_>, point: DVec3) -> Option<[f64; 4]> {
+    let roi = medium.texture.data_roi();
+    let (mut base, mut upper, mut from) = (roi.min, [0usize; 3], [0.0; 3]);
+    for a in 0..3 {
+        let x = point[a].clamp(roi.min[a] as f64, roi.max[a] as f64);
+        if medium.is_nearest() {
+            base[a] = ((x + 0.5).floor() as usize).min(roi.max[a]);
+        } else {
+            base[a] = x.floor() as usize;
+            from[a] = x - base[a] as f64;
+            upper[a] = usize::from(from[a] > 0.0);
+        }
+    }
+    let corners = medium.corners(voxels, base, upper)?;
+    let mut values = [0.0; 4];
+    for (value, corner) in values.iter_mut().zip(&corners).take(medium.fields.len()) {
+        *value = cubic::along_line(corner, from, [0.0; 3])[0];
+    }
+    Some(values)
+}
+
+/// Colour and opacity of the fields' values.
+fn classify(medium: &Medium, values: &[f64; 4]) -> [f64; 4] {
+    let mut rgba = [0.0, 0.0, 0.0, 1.0];
+    for (field, value) in medium.fields.iter().zip(values) {
+        let segment = field.knots.segment(field.knots.segment_of(*value));
+        for c in (0..4).filter(|&c| field.drives[c]) {
+            rgba[c] = if segment.slope[c] == 0.0 { segment.at_base[c] } else { segment.at(c, *value) };
+        }
+    }
+    rgba[3] = rgba[3].clamp(0.0, 1.0);
+    rgba
+}
+
+/// One shape's part of a segment.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Slab {
+    k: i64,
+    /// Where it begins and ends, in the sweep's `t`.
+    t: [f64; 2],
+    /// Optical depth, may be infinite.
+    depth: f64,
+    color: [f64; 3],
+}
+
+/// Adds the segments of one shape, with `shift` from the line's `t` to the sweep's.
+pub(super) fn slabs(
+    medium: &Medium,
+    voxels: &Voxels<'_>,
+    line: &Line,
+    counting: &Counting,
+    shift: f64,
+    slabs: &mut Vec<Slab>,
+) {
+    for s in counting.segments(line) {
+        let Some(values) = sample(medium, voxels, line.point(s.middle())) else { continue };
+        let [r, g, b, a] = classify(medium, &values);
+        if a > 0.0 && s.length() > 0.0 {
+            let depth = if a == 1.0 { f64::INFINITY } else { -(-a).ln_1p() * s.length() / medium.unit };
+            slabs.push(Slab { k: s.k, t: [s.start + shift, s.end + shift], depth, color: [r, g, b] });
+        }
+    }
+}
+
+/// Composites slabs: those of one segment are one, extinctions added.
+pub(super) fn composite(slabs: &mut [Slab], depth_threshold: f64) -> Light {
+    slabs.sort_by_key(|s| s.k);
+    let mut light = Light::NONE;
+    let (mut color, mut left) = ([0.0; 3], 1.0);
+    for group in slabs.chunk_by(|a, b| a.k == b.k) {
+        let depth: f64 = group.iter().map(|s| s.depth).sum();
+        let opaque = group.iter().filter(|s| s.depth.is_infinite()).count() as f64;
+        let weight = |s: &Slab| match opaque > 0.0 {
+            true => f64::from(u8::from(s.depth.is_infinite())) / opaque,
+            false => s.depth / depth,
+        };
+        let absorbed = left * -(-depth).exp_m1();
+        for s in group {
+            for (sum, c) in color.iter_mut().zip(s.color) {
+                *sum += absorbed * weight(s) * c;
+            }
+        }
+        let wanted = (left / (1.0 - depth_threshold)).ln();
+        if light.depth.is_infinite() && depth >= wanted {
+            let start = group.iter().map(|s| s.t[0]).fold(f64::INFINITY, f64::min);
+            let end = group.iter().map(|s| s.t[1]).fold(f64::NEG_INFINITY, f64::max);
+            light.depth = start + if depth.is_finite() { (end - start) * wanted / depth } else { 0.0 };
+        }
+        left *= (-depth).exp();
+    }
+    light.lower = [color[0], color[1], color[2], 1.0 - left];
+    light.upper = light.lower;
+    light
+}
+
+/// Visits the pieces of a pre-integrated line in order.
+pub(super) fn pre_integrated(
+    medium: &Medium,
+    voxels: &Voxels<'_>,
+    line: &Line,
+    counting: &Counting,
+    cutter: &mut Cutter,
+    mut visit: impl FnMut(&Piece) -> bool,
+) {
+    let exact = Line { dt: 0.0, dp: [0.0; 3], ..*line };
+    let mut last: Option<(f64, Option<[f64; 4]>)> = None;
+    for s in counting.segments(line) {
+        let start = match last {
+            Some((t, values)) if t == s.start => values,
+            _ => sample(medium, voxels, line.point(s.start)),
+        };
+        let end = sample(medium, voxels, line.point(s.end));
+        last = Some((s.end, end));
+        let (Some(start), Some(end)) = (start, end) else { continue };
+        let (t, ends) = ([s.start, s.end], [false; 2]);
+        let cell = Cell { base: [0; 3], upper: [0; 3], t, from: [0.0; 3], step: [0.0; 3], ends };
+        if s.length() > 0.0 && !cutter.cut_linear(medium, &exact, &cell, [start, end], &mut visit) {
+            return;
+        }
+    }
+}
+
+/// Gathers the value on the lattice: at middles, or linear between ends.
+pub(super) fn gather(
+    medium: &Medium,
+    voxels: &Voxels<'_>,
+    line: &Line,
+    counting: &Counting,
+    between_ends: bool,
+) -> (Gather, u64) {
+    let (mut gathered, mut samples) = (Gather::NONE, 0);
+    for s in counting.segments(line) {
+        samples += 1;
+        let at = |t: f64| sample(medium, voxels, line.point(t)).map(|v| v[0]);
+        let (first, last) = if between_ends { (s.start, s.end) } else { (s.middle(), s.middle()) };
+        if let (Some(a), Some(b)) = (at(first), at(last)) {
+            gathered.add([a.min(b), a.max(b)], 0.5 * (a + b), s.length(), 0.0);
+        }
+    }
+    (gathered, samples)
+}

@@ -1,0 +1,360 @@
+//! Cells cut into smooth pieces: opacity and colour as cubics, with bounds on their errors.
+//!
+//! In a cell a field is a cubic v(s). It is cut where it is extreme and where it meets a control
+//! point, so that on each piece v is monotone and the classification linear: opacity a and colour
+//! c are cubics, too, written in y = −1 to 1.
+//!
+//! # What is wrong with a piece
+//! The true value differs from the computed one by at most ε: rounding of the polynomial, and
+//! the rounded position times the gradient. Classification is piecewise linear, so away from the
+//! ends of its segment a is wrong by |slope|·ε. Near an end, on a stretch of measure z on which v
+//! is within 2ε of the control point, the true value may already lie in the next segment:
+//! - continuous table: wrong by the steeper slope times ε;
+//! - step: wrong by the step, but on the measure z only (`edge`);
+//! - next segment opaque: whether the ray ends here is in doubt, unless the next piece shows it.
+//!
+//! The measure z follows from the derivative at the end or, where that is too small, from Remez's
+//! inequality: a cubic with |p| ≤ t on a set E of an interval of length W has
+//! max |p| ≤ t·T₃(2W/|E| − 1) ≤ t·(4W/|E|)³/2, hence |E| ≤ 4W·(t / 2 max |p|)^⅓.
+
+use super::{
+    cells::Cell,
+    cubic::{self, Cubic},
+    knots::{Knots, Segment},
+    line::{EPS, Line},
+    medium::{Field, Medium, Voxels},
+};
+
+/// What a piece absorbs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// Nothing.
+    Transparent,
+    /// Some of the light.
+    Smooth,
+    /// All light; `certain` unless rounding may have made it up.
+    Opaque { certain: bool },
+}
+
+/// A stretch on which opacity and colour are cubics of y = −1 to 1.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Piece {
+    /// Where it begins and ends, in the ray's `t` less the sweep's own zero.
+    pub t: [f64; 2],
+    pub kind: Kind,
+    pub opacity: Cubic,
+    pub color: [Cubic; 3],
+    /// Bound on the error of `opacity`.
+    pub opacity_error: f64,
+    /// Bound on the error of any `color`.
+    pub color_error: f64,
+    /// Bound on ∫ |error of ln(1 − a)| dy near the ends, where `opacity_error` does not hold.
+    pub edge: f64,
+    /// Bound on ∫ |ln(1 − a)|·|error of c| dy there.
+    pub edge_color: f64,
+    /// How much flatter 1 − a may rise from a zero than this piece says.
+    pub ratio: f64,
+    /// Whether an opaque stretch that is not seen here may follow.
+    pub doubt: bool,
+    /// World length over which opacity is the fraction absorbed.
+    pub unit: f64,
+    /// Which place's face it begins at, if it is one; for shapes that share a place.
+    pub entry: Option<usize>,
+}
+
+/// Remez: on a set of measure `w` of an interval of measure 2, −ln |p| of a cubic p with maximum
+/// `most` integrates to at most this.
+pub(super) fn log_bound(w: f64, most: f64) -> f64 {
+    if w <= 0.0 {
+        return 0.0;
+    }
+    if most <= 0.0 {
+        return f64::INFINITY;
+    }
+    (w * (-(2.0 * most).ln() + 3.0 * (8.0 / w).ln() + 3.0)).max(0.0)
+}
+
+/// A field in a cell.
+#[derive(Clone, Copy)]
+struct Local<'a> {
+    field: &'a Field,
+    /// The value less `origin`.
+    value: Cubic,
+    origin: f64,
+    /// Lowest and highest corner.
+    range: [f64; 2],
+    /// Bound on the error of `value`.
+    error: f64,
+    /// The one segment of the whole cell, if there is but one.
+    segment: Option<usize>,
+}
+
+/// Cuts cells into pieces; keeps its scratch memory from cell to cell.
+#[derive(Default)]
+pub(super) struct Cutter {
+    cuts: Vec<f64>,
+}
+
+impl Cutter {
+    /// Visits the pieces of a cell in order until `visit` says false, which is passed on.
+    pub fn cut(
+        &mut self,
+        medium: &Medium,
+        voxels: &Voxels<'_>,
+        line: &Line,
+        cell: &Cell,
+        mut visit: impl FnMut(&Piece) -> bool,
+    ) -> bool {
+        let Some(corners) = medium.corners(voxels, cell.base, cell.upper) else { return true };
+        let count = medium.fields.len();
+        let mut locals = [None; 4];
+        for (i, field) in medium.fields.iter().enumerate() {
+            locals[i] = Some(local(field, &corners[i], line, cell));
+        }
+        self.visit_pieces(medium, &locals[..count], line, cell, &mut visit)
+    }
+
+    /// Visits the pieces of a stretch on which every field is linear between two values.
+    pub fn cut_linear(
+        &mut self,
+        medium: &Medium,
+        line: &Line,
+        cell: &Cell,
+        values: [[f64; 4]; 2],
+        mut visit: impl FnMut(&Piece) -> bool,
+    ) -> bool {
+        let mut locals = [None; 4];
+        for (i, field) in medium.fields.iter().enumerate() {
+            let (a, b) = (values[0][i], values[1][i]);
+            let (low, high) = (field.knots.segment_of(a.min(b)), field.knots.segment_of(a.max(b)));
+            let range = [a.min(b), a.max(b)];
+            let (value, segment) = ([0.0, b - a, 0.0, 0.0], (low == high).then_some(low));
+            locals[i] = Some(Local { field, value, origin: a, range, error: 4.0 * EPS * (b - a).abs(), segment });
+        }
+        self.visit_pieces(medium, &locals[..medium.fields.len()], line, cell, &mut visit)
+    }
+
+    fn visit_pieces(
+        &mut self,
+        medium: &Medium,
+        locals: &[Option<Local<'_>>],
+        line: &Line,
+        cell: &Cell,
+        visit: &mut impl FnMut(&Piece) -> bool,
+    ) -> bool {
+        self.find_cuts(locals);
+        for i in 1..self.cuts.len() {
+            let (a, b) = (self.cuts[i - 1], self.cuts[i]);
+            if b > a && !visit(&piece(medium, locals, line, cell, [a, b])) {
+                return false;
+            }
+        }
+        true
+    }
+
+    fn find_cuts(&mut self, locals: &[Option<Local<'_>>]) {
+        self.cuts.clear();
+        self.cuts.push(0.0);
+        for local in locals.iter().flatten().filter(|l| l.segment.is_none()) {
+            let critical = cubic::critical_points(&local.value);
+            let bends = [0.0, critical[0], critical[1], 1.0].into_iter().filter(|s| !s.is_nan());
+            let mut from = 0.0;
+            for to in bends.skip(1) {
+                self.cut_monotone(local, from, to);
+                self.cuts.push(to);
+                from = to;
+            }
+        }
+        self.cuts.push(1.0);
+        self.cuts.sort_by(f64::total_cmp);
+        self.cuts.dedup();
+    }
+
+    fn cut_monotone(&mut self, local: &Local<'_>, a: f64, b: f64) {
+        let at = |s| cubic::eval(&local.value, s) + local.origin;
+        let (va, vb) = (at(a), at(b));
+        let (lo, hi) = (va.min(vb), va.max(vb));
+        for point in local.field.knots.between(lo, hi) {
+            let value = point.value - local.origin;
+            self.cuts.push(cubic::crossing(&local.value, value, a, b));
+        }
+    }
+}
+
+fn local<'a>(field: &'a Field, corner: &[f64; 8], line: &Line, cell: &Cell) -> Local<'a> {
+    let range = corner.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], &v| [lo.min(v), hi.max(v)]);
+    let origin = corner[0];
+    let knots = &field.knots;
+    if range[0] == range[1] {
+        let segment = Some(knots.segment_of(origin));
+        return Local { field, value: [0.0; 4], origin, range, error: 0.0, segment };
+    }
+    let value = cubic::along_line(&corner.map(|v| v - origin), cell.from, cell.step);
+    let (spread, most) = (range[1] - range[0], range[0].abs().max(range[1].abs()));
+    let error = (line.dp[0] + line.dp[1] + line.dp[2] + 64.0 * EPS) * spread + 4.0 * EPS * most;
+    let low = knots.segment_of(range[0]);
+    let segment = (low == knots.segment_of(range[1])).then_some(low);
+    Local { field, value, origin, range, error, segment }
+}
+
+fn piece(medium: &Medium, locals: &[Option<Local<'_>>], line: &Line, cell: &Cell, s: [f64; 2]) -> Piece {
+    let span = cell.t[1] - cell.t[0];
+    let at = |s: f64| if s == 1.0 { cell.t[1] } else { cell.t[0] + span * s };
+    let mut made = Piece {
+        t: [at(s[0]), at(s[1])],
+        kind: Kind::Opaque { certain: true },
+        opacity: [1.0, 0.0, 0.0, 0.0],
+        color: [[0.0; 4]; 3],
+        opacity_error: 0.0,
+        color_error: 0.0,
+        edge: 0.0,
+        edge_color: 0.0,
+        ratio: 1.0,
+        doubt: false,
+        unit: medium.unit,
+        entry: None,
+    };
+    for local in locals.iter().flatten() {
+        classify(&mut made, local, s);
+    }
+    let ends = [cell.ends[0] && s[0] == 0.0, cell.ends[1] && s[1] == 1.0];
+    let loose = if medium.is_nearest() { [s[0] == 0.0, s[1] == 1.0] } else { ends };
+    loosen_ends(&mut made, loose, line.dt);
+    made
+}
+
+/// Sets the channels that a field drives.
+fn classify(made: &mut Piece, local: &Local<'_>, s: [f64; 2]) {
+    let value = cubic::restrict(&local.value, 0.5 * (s[0] + s[1]), 0.5 * (s[1] - s[0]));
+    let knots = &local.field.knots;
+    let number = local.segment.unwrap_or_else(|| knots.segment_of(value[0] + local.origin));
+    let segment = knots.segment(number);
+    let ends = [cubic::eval(&value, -1.0) + local.origin, cubic::eval(&value, 1.0) + local.origin];
+    let [lo, hi] = [ends[0].min(ends[1]), ends[0].max(ends[1])];
+    let error = match local.segment {
+        Some(_) => local.error,
+        None => local.error + (segment.lo - lo).max(0.0) + (hi - segment.hi).max(0.0),
+    };
+    let offset = local.origin - segment.base;
+    for c in (0..4).filter(|&c| local.field.drives[c]) {
+        let k = segment.slope[c];
+        let constant = if k == 0.0 { segment.at_base[c] } else { segment.at_base[c] + k * (offset + value[0]) };
+        let channel = [constant, k * value[1], k * value[2], k * value[3]];
+        let size = segment.at_base[c].abs() + k.abs() * (hi - lo).max((offset + value[0]).abs());
+        let wrong = k.abs() * error + if k == 0.0 { 0.0 } else { 8.0 * EPS * size };
+        if c < 3 {
+            made.color[c] = channel;
+            made.color_error = made.color_error.max(wrong);
+        } else {
+            made.opacity = channel;
+            made.opacity_error = wrong;
+            made.kind = if segment.is_transparent() {
+                Kind::Transparent
+            } else if segment.is_opaque() {
+                let certain = local.segment.is_some() || depth_inside(local, segment, [lo, hi]) > 4.0 * error;
+                Kind::Opaque { certain }
+            } else {
+                Kind::Smooth
+            };
+        }
+    }
+    if local.segment.is_none() {
+        for upward in [false, true] {
+            look_across(made, local, number, upward, &value, [lo, hi], error);
+        }
+    }
+}
+
+/// How far inside its segment the value gets, counted from the ends that data can pass.
+fn depth_inside(local: &Local<'_>, segment: &Segment, [lo, hi]: [f64; 2]) -> f64 {
+    let above_lo = if local.range[0] < segment.lo { hi - segment.lo } else { f64::INFINITY };
+    let below_hi = if local.range[1] > segment.hi { segment.hi - lo } else { f64::INFINITY };
+    above_lo.min(below_hi)
+}
+
+/// Accounts for the next segment where the value comes near to it.
+fn look_across(
+    made: &mut Piece,
+    local: &Local<'_>,
+    number: usize,
+    upward: bool,
+    value: &Cubic,
+    [lo, hi]: [f64; 2],
+    error: f64,
+) {
+    let knots: &Knots = &local.field.knots;
+    let segment = knots.segment(number);
+    let (knot, near, reachable) = if upward {
+        (segment.hi, hi + 2.0 * error >= segment.hi, local.range[1] > segment.hi)
+    } else {
+        (segment.lo, lo - 2.0 * error <= segment.lo, local.range[0] < segment.lo)
+    };
+    if !near || !reachable {
+        return;
+    }
+    let Some(next) = knots.neighbour(number, upward) else { return };
+    let far = (lo - knot).abs().max((hi - knot).abs());
+    let zone = zone(value, if upward == (value[1] >= 0.0) { 1.0 } else { -1.0 }, far, error);
+    made.doubt |= next.hi - next.lo < 4.0 * error;
+    let opacity = if local.field.drives[3] { Some([segment.at(3, knot), next.at(3, knot)]) } else { None };
+    if let Some([own, other]) = opacity {
+        made.doubt |= next.is_opaque() && !segment.is_opaque();
+        let slope = next.slope[3].abs();
+        let step = (own - other).abs();
+        if step <= 1e-14 && slope * error <= 1e-12 {
+            made.opacity_error = made.opacity_error.max(slope * error + step);
+        } else if !segment.is_opaque() && !next.is_opaque() {
+            made.edge += edge([own, other], [segment.slope[3].abs(), slope], error, zone, far);
+        } else if !segment.is_opaque() {
+            made.edge += edge([own, own], [segment.slope[3].abs(); 2], error, zone, far);
+        }
+        if own > 1.0 - 1e-9 && segment.slope[3] != 0.0 {
+            made.ratio = made.ratio.min(slope / segment.slope[3].abs());
+        }
+    }
+    for c in (0..3).filter(|&c| local.field.drives[c]) {
+        let wrong = next.slope[c].abs() * error + (segment.at(c, knot) - next.at(c, knot)).abs();
+        if wrong <= 1e-12 {
+            made.color_error = made.color_error.max(wrong);
+        } else {
+            let [own, other] = opacity.unwrap_or([0.5; 2]);
+            let log = edge([own, other], [segment.slope[3].abs(), next.slope[3].abs()], error, zone, far);
+            made.edge_color += wrong * if log.is_finite() { log } else { zone };
+        }
+    }
+}
+
+/// Bound on the measure of y on which the value is within 2ε of a control point.
+fn zone(value: &Cubic, end: f64, far: f64, error: f64) -> f64 {
+    let steep = cubic::slope(value, end).abs();
+    let bend = 2.0 * value[2].abs() + 6.0 * value[3].abs();
+    let z = 6.0 * error / steep;
+    if z.is_finite() && bend * z <= 0.5 * steep {
+        return z.min(2.0);
+    }
+    if far <= 8.0 * error { 2.0 } else { (8.0 * (3.0 * error / (2.0 * far)).cbrt()).min(2.0) }
+}
+
+/// Bound on ∫ (|ln(1 − a)| + |ln(1 − a')|) dy over a zone at a control point with opacities a, a'.
+fn edge(opacity: [f64; 2], slope: [f64; 2], error: f64, zone: f64, far: f64) -> f64 {
+    let one = |a: f64, slope: f64| {
+        let least = 1.0 - a - 4.0 * slope * error;
+        if least > 1e-9 { -zone * least.ln() } else { log_bound(zone, slope * far * 0.5) }
+    };
+    one(opacity[0], slope[0]) + one(opacity[1], slope[1])
+}
+
+/// Accounts for the uncertain place of a piece's ends.
+fn loosen_ends(made: &mut Piece, loose: [bool; 2], dt: f64) {
+    let length = made.t[1] - made.t[0];
+    for (end, _) in [-1.0, 1.0].into_iter().zip(loose).filter(|(_, l)| *l) {
+        if let Kind::Opaque { certain } = &mut made.kind {
+            *certain &= length > 8.0 * dt;
+        } else if made.kind == Kind::Smooth {
+            let zone = 4.0 * dt / length;
+            let least = 1.0 - cubic::eval(&made.opacity, end) - made.opacity_error;
+            let most = 1.0 - cubic::eval(&made.opacity, -end).min(cubic::eval(&made.opacity, end));
+            made.edge += if least > 1e-9 { -2.0 * zone * least.ln() } else { 2.0 * log_bound(zone, most) };
+        }
+    }
+}
