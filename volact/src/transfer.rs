@@ -86,7 +86,7 @@ pub fn automatic(volume: &Volume) -> Automatic {
     if statistics.percentile(0.0) == statistics.percentile(1.0) {
         return constant(volume, &statistics, notes);
     }
-    match statistics.labels() {
+    match statistics.labels(volume, 0) {
         Some(labels) => segmentation(volume, &statistics, &labels, notes),
         None => intensity(volume, &statistics, notes),
     }

@@ -72,9 +72,9 @@ impl Statistics {
         self.sorted.get((fraction * last as f64).round() as usize).map_or(0.0, |&v| f64::from(v))
     }
 
-    /// The distinct values, where the volume is a segmentation: few whole
-    /// numbers, and neighbours that jump from any one to any other instead of climbing.
-    pub fn labels(&self) -> Option<BTreeSet<i64>> {
+    /// The distinct values, where the volume is a segmentation: few whole numbers, each in
+    /// regions of its own, and neighbours that jump from any one to any other instead of climbing.
+    pub fn labels(&self, volume: &Volume, component: usize) -> Option<BTreeSet<i64>> {
         let mut labels = BTreeSet::new();
         for &v in &self.sorted {
             if v.fract() != 0.0 || labels.len() > MOST_LABELS {
@@ -82,6 +82,30 @@ impl Statistics {
             }
             labels.insert(v as i64);
         }
+        // Two values are a mask, which has but one kind of step.
+        let few = (2..=MOST_LABELS).contains(&labels.len());
+        (few && self.in_regions(volume, component) && (labels.len() == 2 || self.jumps(&labels))).then_some(labels)
+    }
+
+    /// Whether most values mostly have their own kind beside them. Where surfaces are smooth, the
+    /// values between two materials have not.
+    fn in_regions(&self, volume: &Volume, component: usize) -> bool {
+        let [nx, ny, _] = self.dims;
+        let mut kinds: BTreeMap<i64, [usize; 2]> = BTreeMap::new();
+        for (i, &value) in self.values.iter().enumerate().filter(|(_, v)| !v.is_nan()) {
+            let at = [i % nx, i / nx % ny, i / (nx * ny)].map(|n| n * self.stride);
+            let beside = if at[0] + 1 < volume.dims()[0] { at[0] + 1 } else { at[0].saturating_sub(1) };
+            let same = volume.value([beside, at[1], at[2]], component) as f32 == value;
+            let [all, alike] = kinds.entry(value as i64).or_default();
+            *all += 1;
+            *alike += usize::from(same);
+        }
+        let regions = kinds.values().filter(|[all, alike]| alike * 2 >= *all).count();
+        regions * 10 >= kinds.len() * 7
+    }
+
+    /// Whether a fair part of the steps between neighbours leave out values that lie between.
+    fn jumps(&self, labels: &BTreeSet<i64>) -> bool {
         let ranks: BTreeMap<i64, i64> = labels.iter().zip(0..).map(|(v, rank)| (*v, rank)).collect();
         let rank = |v: f32| ranks.get(&(v as i64)).copied();
         let (mut steps, mut jumps) = (0usize, 0usize);
@@ -93,9 +117,7 @@ impl Statistics {
                 }
             }
         }
-        // Two values are a mask, which has but one kind of step.
-        let few = (2..=MOST_LABELS).contains(&labels.len());
-        (few && (labels.len() == 2 || jumps * 4 > steps)).then_some(labels)
+        jumps * 4 > steps
     }
 
     /// What surrounds the subject, from the samples on the volume's faces.
