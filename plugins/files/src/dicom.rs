@@ -193,7 +193,7 @@ fn gather(
         storage.list(path)?
     } else {
         let own = read_file(storage, path)?;
-        let own = own.ok_or_else(|| LoadError::invalid(path, "bytes 128 to 131", "something else", "DICM"))?;
+        let own = own.ok_or_else(|| LoadError::invalid(path, "head", "without DICM at byte 128", "a DICOM file"))?;
         wanted.get_or_insert(own.text(tag::SERIES).unwrap_or_default());
         storage.list(path.parent().unwrap_or(Path::new("")))?
     };
@@ -240,7 +240,7 @@ fn read_file(storage: &Storage, path: &Path) -> Result<Option<Elements>, LoadErr
 
 fn slice(e: &Elements, path: PathBuf) -> Result<Slice, LoadError> {
     let layout = layout(e, &path)?;
-    let missing = |name: &str| LoadError::invalid(&path, name, "missing", "it");
+    let missing = |name: &str| LoadError::invalid(&path, name, "missing", "one");
     let position: [f64; 3] =
         e.decimals(tag::POSITION, "ImagePositionPatient")?.ok_or_else(|| missing("ImagePositionPatient"))?;
     let orientation: [f64; 6] =

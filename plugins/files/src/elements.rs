@@ -69,7 +69,7 @@ impl Elements {
 
     /// A 16-bit number that must be there.
     pub(crate) fn need_short(&self, tag: u32, name: &str) -> Result<u16, LoadError> {
-        self.short(tag).ok_or_else(|| LoadError::invalid(&self.path, name, "missing", "it"))
+        self.short(tag).ok_or_else(|| LoadError::invalid(&self.path, name, "missing", "one"))
     }
 }
 
@@ -132,7 +132,7 @@ fn start_data(path: &Path, walk: &mut Walk<'_>, elements: &mut Elements) -> Resu
     match elements.syntax.as_str() {
         "1.2.840.10008.1.2" => walk.implicit = true,
         "1.2.840.10008.1.2.2" => walk.big = true,
-        "" => return Err(LoadError::invalid(path, "transfer syntax", "missing", "it")),
+        "" => return Err(LoadError::invalid(path, "transfer syntax", "missing", "one")),
         "1.2.840.10008.1.2.1.99" => {
             let cure = "save it uncompressed (explicit VR little endian)".into();
             return Err(LoadError::Unsupported { path: path.into(), what: "a deflated data set".into(), cure });

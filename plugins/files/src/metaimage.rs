@@ -91,7 +91,7 @@ impl Header {
     }
 
     fn need(&self, field: &str) -> Result<&str, LoadError> {
-        self.get(field).ok_or_else(|| LoadError::invalid(&self.path, format!("field {field:?}"), "missing", "it"))
+        self.get(field).ok_or_else(|| LoadError::invalid(&self.path, format!("field {field:?}"), "missing", "one"))
     }
 
     fn first_of<'a>(&self, names: &[&'a str]) -> Option<(&'a str, &str)> {

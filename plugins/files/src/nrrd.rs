@@ -136,7 +136,7 @@ impl Header {
     }
 
     fn need(&self, path: &Path, field: &'static str) -> Result<&str, LoadError> {
-        self.get(field).ok_or_else(|| LoadError::invalid(path, format!("field {field:?}"), "missing", "it"))
+        self.get(field).ok_or_else(|| LoadError::invalid(path, format!("field {field:?}"), "missing", "one"))
     }
 }
 

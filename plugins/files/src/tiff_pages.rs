@@ -17,7 +17,7 @@
 //! their numbers mean.
 
 use std::{
-    io::BufReader,
+    io::{BufReader, ErrorKind},
     path::{Path, PathBuf},
 };
 
@@ -83,7 +83,12 @@ impl Layout {
 }
 
 fn failed(path: &Path, error: TiffError) -> LoadError {
-    LoadError::Decode { path: path.into(), source: Box::new(error) }
+    let message = match &error {
+        TiffError::IoError(e) if e.kind() == ErrorKind::UnexpectedEof => "the file ends too early".into(),
+        // The source repeats the message, so that a chain would say it twice.
+        other => other.to_string(),
+    };
+    LoadError::Decode { path: path.into(), source: message.into() }
 }
 
 fn decoder(storage: &Storage, path: &Path) -> Result<Pages, LoadError> {

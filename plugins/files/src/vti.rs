@@ -95,7 +95,7 @@ fn parse(storage: &Storage, path: &Path) -> Result<Image, LoadError> {
         buffer.clear();
         let event = xml
             .read_event_into(&mut buffer)
-            .map_err(|e| LoadError::Decode { path: path.into(), source: Box::new(e) })?;
+            .map_err(|e| LoadError::Decode { path: path.into(), source: e.to_string().into() })?;
         let empty = matches!(event, Event::Empty(_));
         match event {
             Event::Start(e) | Event::Empty(e) => match e.name().as_ref() {
@@ -163,7 +163,7 @@ fn parse(storage: &Storage, path: &Path) -> Result<Image, LoadError> {
         }
     }
     if !is_vtk {
-        return Err(LoadError::invalid(path, "element VTKFile", "missing", "it"));
+        return Err(LoadError::invalid(path, "element VTKFile", "missing", "one"));
     }
     Ok(image)
 }
@@ -265,7 +265,7 @@ fn open(storage: &Storage, path: &Path, options: &LoadOptions) -> Result<Box<dyn
             let offset: u64 = fields::value(path, "offset", array.offset.as_deref().unwrap_or(""), "a whole number")?;
             Source { base64, start: first.saturating_add(offset), end: storage.length(path)? }
         }
-        ("appended", None) => return Err(LoadError::invalid(path, "element AppendedData", "missing", "it")),
+        ("appended", None) => return Err(LoadError::invalid(path, "element AppendedData", "missing", "one")),
         (other, _) => {
             let wanted = "ascii, binary or appended";
             return Err(LoadError::invalid(path, "array format", format!("{other:?}"), wanted));
@@ -310,8 +310,8 @@ fn choose<'a>(path: &Path, image: &'a Image, wanted: Option<&str>) -> Result<&'a
 }
 
 fn describe(path: &Path, image: &Image, array: &Array) -> Result<VolumeDesc, LoadError> {
-    let whole = image.whole.ok_or_else(|| LoadError::invalid(path, "element ImageData", "missing", "it"))?;
-    let piece = image.piece.ok_or_else(|| LoadError::invalid(path, "element Piece", "missing", "it"))?;
+    let whole = image.whole.ok_or_else(|| LoadError::invalid(path, "element ImageData", "missing", "one"))?;
+    let piece = image.piece.ok_or_else(|| LoadError::invalid(path, "element Piece", "missing", "one"))?;
     if whole != piece {
         let wanted = format!("the whole, {whole:?}");
         return Err(LoadError::invalid(path, "Piece Extent", format!("{piece:?}"), wanted));

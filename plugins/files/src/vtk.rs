@@ -225,14 +225,14 @@ impl Scan<'_> {
             }
         };
         let Some(points) = points else {
-            return Err(LoadError::invalid(path, "POINT_DATA", format!("missing before {word}"), "it"));
+            return Err(LoadError::invalid(path, "POINT_DATA", format!("missing before {word}"), "one"));
         };
         let (name, type_name) = (unescape(arg(1)?), type_name.to_owned());
         let kind = kind(path, &type_name)?;
         if word == "SCALARS" {
             let line = next_line(&mut self.lines)?.unwrap_or_default();
             if !line.trim_start().to_uppercase().starts_with("LOOKUP_TABLE") {
-                let found: String = line.chars().take(40).collect();
+                let found: String = line.chars().take(12).collect();
                 return Err(LoadError::invalid(path, "line after SCALARS", format!("{found:?}"), "LOOKUP_TABLE"));
             }
         }

@@ -59,5 +59,6 @@ pub(crate) const AXES: [DVec3; 3] = [DVec3::X, DVec3::Y, DVec3::Z];
 
 /// Turns RAS into LPS, and back.
 pub(crate) fn flip_ras(v: DVec3) -> DVec3 {
-    DVec3::new(-v.x, -v.y, v.z)
+    // Adding zero keeps -0 out of messages.
+    DVec3::new(-v.x, -v.y, v.z) + DVec3::ZERO
 }
