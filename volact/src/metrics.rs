@@ -1,6 +1,6 @@
 //! How much two pictures differ: the one place where that is computed.
 //!
-//! Pictures are straight RGBA numbers, rows from the top. [`Differences`] holds
+//! Pictures are premultiplied RGBA numbers, rows from the top. [`Differences`] holds
 //!
 //! - the largest absolute difference and the root of the mean square, over all four channels as
 //!   the numbers stand, and the PSNR that follows for a peak of 1;
@@ -17,7 +17,7 @@ pub mod flip;
 
 use thiserror::Error;
 
-/// A picture to compare: straight RGBA, row by row from the top.
+/// A picture to compare: premultiplied RGBA, row by row from the top.
 #[derive(Clone, Copy, Debug)]
 pub struct Image<'a> {
     /// Columns.
@@ -124,9 +124,8 @@ fn difference(a: f32, b: f32) -> f64 {
 }
 
 /// Colour over black, clamped to 0..1; what is no number counts as 0.
-fn shown([r, g, b, a]: [f32; 4]) -> [f64; 3] {
-    let clamp = |v: f32| if v.is_nan() { 0.0 } else { f64::from(v).clamp(0.0, 1.0) };
-    [r, g, b].map(|v| clamp(v) * clamp(a))
+fn shown([r, g, b, _]: [f32; 4]) -> [f64; 3] {
+    [r, g, b].map(|v| if v.is_nan() { 0.0 } else { f64::from(v).clamp(0.0, 1.0) })
 }
 
 /// Half the width of the SSIM window without its middle.
