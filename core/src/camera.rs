@@ -202,6 +202,32 @@ impl Camera {
     }
 }
 
+/// What [`RayGrid::ray`] computes rays from: the point on the image plane for pixel coordinates is
+/// `corner + x·dx + y·dy`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LinearRays {
+    /// The eye of a perspective view; the image plane is then given relative to it, and a ray's
+    /// direction is the normalised point.
+    pub eye: Option<DVec3>,
+    /// The direction of all rays of a parallel view; a ray's origin is then the point less its
+    /// part along the direction.
+    pub direction: DVec3,
+    /// `t` from which depth is counted.
+    pub depth_zero: f64,
+    /// The point for pixel coordinates (0, 0).
+    pub corner: DVec3,
+    /// Its change from column to column.
+    pub dx: DVec3,
+    /// Its change from row to row.
+    pub dy: DVec3,
+    /// Normal of the near and far planes.
+    pub axis: DVec3,
+    /// `axis·p` on the near plane.
+    pub near: f64,
+    /// `axis·p` on the far plane.
+    pub far: f64,
+}
+
 /// All rays of a picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RayGrid {
@@ -231,6 +257,16 @@ impl RayGrid {
             GridKind::Perspective { eye } => Some(eye),
             GridKind::Parallel { .. } => None,
         }
+    }
+
+    /// The coefficients from which kernels make many rays at once.
+    pub fn linear(&self) -> LinearRays {
+        let (eye, direction, depth_zero) = match self.kind {
+            GridKind::Perspective { eye } => (Some(eye), DVec3::ZERO, 0.0),
+            GridKind::Parallel { direction, zero } => (None, direction, zero),
+        };
+        let (corner, dx, dy, axis) = (self.corner, self.dx, self.dy, self.axis);
+        LinearRays { eye, direction, depth_zero, corner, dx, dy, axis, near: self.near, far: self.far }
     }
 
     /// The view axis: normal of near and far planes, pointing away from the eye.

@@ -14,7 +14,7 @@ use thiserror::Error as ThisError;
 
 use super::{
     CameraSpec, DataSpec, GeometrySpec, ParameterSpec, Problem, Problems, SceneFile, ShapeSpec, TransformStep,
-    VolumeSpec, check, document::MAX_BYTES, values,
+    VolumeSpec, check, document::MAX_BYTES,
 };
 use crate::{
     Appearance, Block, FrameDesc, Geometry, Options, ParameterDecl, ParameterValue, Progress, Registry, Shape, Volume,
@@ -230,15 +230,10 @@ impl<'a> Build<'a> {
         for (name, spec) in specs {
             let path = format!("{path}.{name}");
             let value = match spec {
-                ParameterSpec::Value(value) => Some(declared(name).map_or(value.clone(), |d| check::coerce(value, &d))),
                 ParameterSpec::Volume(volume) => self.texture(&path, volume).map(ParameterValue::Volume),
-                ParameterSpec::Table(table) => match values::table(table, self.base) {
-                    Ok(table) => Some(ParameterValue::Table(table)),
-                    Err((found, wanted)) => self.refuse(&path, found, wanted),
-                },
-                ParameterSpec::Attribute(attribute) => match values::attribute(attribute, self.base) {
-                    Ok(attribute) => Some(ParameterValue::Attribute(attribute)),
-                    Err((found, wanted)) => self.refuse(&path, found, wanted),
+                other => match other.to_value(declared(name).as_ref(), self.base) {
+                    Ok(value) => Some(value),
+                    Err(problem) => self.refuse(&path, problem.found, problem.wanted),
                 },
             };
             made.extend(value.map(|value| (name.clone(), value)));

@@ -242,8 +242,11 @@ fn read_number(word: &str) -> Option<Token> {
         _ => return None,
     };
     let ((base, digits), based) = radix(word);
+    if digits.starts_with('_') {
+        return None;
+    }
     let digits = digits.replace('_', "");
-    if digits == "inf" || digits == "NaN" {
+    if !based && (digits == "inf" || digits == "NaN") {
         return Some(Token::Number { value: format!("{sign}{digits}").parse().ok()?, whole: None });
     }
     if !based && !digits.starts_with(|c: char| c.is_ascii_digit() || c == '.') {

@@ -25,7 +25,8 @@ pub(crate) fn plain_parameters(reader: &mut Reader, at: &At) -> BTreeMap<String,
     entries.into_iter().filter_map(read).collect()
 }
 
-fn parameter(reader: &mut Reader, at: &At) -> Option<ParameterSpec> {
+/// One value of any kind.
+pub(super) fn parameter(reader: &mut Reader, at: &At) -> Option<ParameterSpec> {
     match head(at) {
         "Volume" => volume(reader, at).map(ParameterSpec::Volume),
         "Table" | "Entries" | "WindowLevel" => table(reader, at).map(ParameterSpec::Table),

@@ -1,9 +1,12 @@
-//! Makes tables and attributes from their descriptions and files.
+//! Makes values from their descriptions and files.
 
 use std::{fs, io::Read, path::Path};
 
-use super::{AttributeSpec, AttributeValues, TableEntries, TableSpec};
-use crate::{Buffer, LookupTable, ScalarType, parameter::Attribute};
+use super::{
+    AttributeSpec, AttributeValues, ParameterSpec, Problem, Problems, TableEntries, TableSpec, check, document,
+    parameters, reader::Reader,
+};
+use crate::{Buffer, LookupTable, ParameterDecl, ParameterValue, ScalarType, parameter::Attribute};
 
 /// The longest table or attribute file in bytes.
 const MAX_FILE: u64 = 1 << 30;
@@ -11,8 +14,46 @@ const MAX_FILE: u64 = 1 << 30;
 /// What was found, and what was wanted.
 type Fault = (String, String);
 
+impl ParameterSpec {
+    /// Reads one value as a scene writes it.
+    ///
+    /// ```
+    /// use volact_core::{ParameterValue, scene::ParameterSpec};
+    ///
+    /// let value = ParameterSpec::parse("(1, 0, 0)")?.to_value(None, "".as_ref())?;
+    /// assert_eq!(value, ParameterValue::Vec3(volact_core::glam::DVec3::X));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    ///
+    /// # Errors
+    /// All problems.
+    pub fn parse(text: &str) -> Result<Self, Problems> {
+        let root = document::parse(text).map_err(|problem| Problems::new(vec![problem]))?;
+        let mut reader = Reader::default();
+        let at = reader.root(&root);
+        let value = parameters::parameter(&mut reader, &at);
+        reader.done()?;
+        value.ok_or_else(|| Problems::new(vec![Problem::new(None, "", "nothing", "a value")]))
+    }
+
+    /// Makes the value; files are relative to `base`. Where `declared` wants a colour, three or
+    /// four numbers are one.
+    ///
+    /// # Errors
+    /// If a table or an attribute cannot be made, or the value is a volume, which needs a scene.
+    pub fn to_value(&self, declared: Option<&ParameterDecl>, base: &Path) -> Result<ParameterValue, Problem> {
+        let made = match self {
+            Self::Value(value) => Ok(declared.map_or(value.clone(), |decl| check::coerce(value, decl))),
+            Self::Table(spec) => table(spec, base).map(ParameterValue::Table),
+            Self::Attribute(spec) => attribute(spec, base).map(ParameterValue::Attribute),
+            Self::Volume(_) => Err(("a volume".into(), "a value that needs no data of a scene".into())),
+        };
+        made.map_err(|(found, wanted)| Problem::new(None, "", found, wanted))
+    }
+}
+
 /// A lookup table.
-pub(super) fn table(spec: &TableSpec, base: &Path) -> Result<LookupTable, Fault> {
+fn table(spec: &TableSpec, base: &Path) -> Result<LookupTable, Fault> {
     let fault = |error: crate::table::TableError| (error.to_string(), "a lookup table".to_owned());
     let table = match &spec.entries {
         TableEntries::Points(points) => LookupTable::from_points(points.clone()),
@@ -30,7 +71,7 @@ pub(super) fn table(spec: &TableSpec, base: &Path) -> Result<LookupTable, Fault>
 }
 
 /// Per-vertex numbers.
-pub(super) fn attribute(spec: &AttributeSpec, base: &Path) -> Result<Attribute, Fault> {
+fn attribute(spec: &AttributeSpec, base: &Path) -> Result<Attribute, Fault> {
     let size = spec.scalar.size();
     let data = match &spec.values {
         AttributeValues::Inline(values) => {

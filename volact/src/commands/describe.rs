@@ -1,8 +1,12 @@
-//! `volact describe [NAME]`: what is registered.
+//! `volact describe [NAME]`: what is registered, and what it takes.
 
-use std::process::ExitCode;
+use std::{fmt::Write as _, process::ExitCode};
 
-use volact::Registry;
+use anyhow::bail;
+use volact::{
+    Declaration, ParameterDecl, Registry,
+    core::{names, parameter::Kind},
+};
 
 /// Arguments of `volact describe`.
 #[derive(clap::Args)]
@@ -13,10 +17,81 @@ pub struct Args {
 
 /// Prints declarations.
 pub fn run(args: Args, registry: &Registry) -> anyhow::Result<ExitCode> {
-    for d in registry.declarations() {
-        if args.name.as_ref().is_none_or(|n| *n == d.name) {
-            super::print(&format!("{} {} {}: {}\n", d.kind.name(), d.name, d.version, d.description))?;
+    let all = registry.declarations();
+    let text = match &args.name {
+        None => list(&all),
+        Some(name) => {
+            let found: Vec<_> = all.iter().copied().filter(|d| d.name == *name).collect();
+            if found.is_empty() {
+                let hint = names::hint(name, all.iter().map(|d| d.name.as_str()));
+                bail!("nothing is called {name:?}{hint}; `volact describe` lists all names");
+            }
+            found.into_iter().map(|d| full(d, registry)).collect::<Vec<_>>().join("\n")
+        }
+    };
+    super::print(&text)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn list(all: &[&Declaration]) -> String {
+    let mut text = String::new();
+    let width = all.iter().map(|d| d.name.len()).max().unwrap_or(0);
+    for kind in [Kind::Action, Kind::Shader, Kind::Geometry, Kind::Loader] {
+        let of_kind: Vec<_> = all.iter().filter(|d| d.kind == kind).collect();
+        if of_kind.is_empty() {
+            continue;
+        }
+        let gap = if text.is_empty() { "" } else { "\n" };
+        let plural = if kind == Kind::Geometry { "geometries".into() } else { format!("{}s", kind.name()) };
+        _ = writeln!(text, "{gap}{plural}");
+        for d in of_kind {
+            _ = writeln!(text, "  {:width$}  {}", d.name, d.description);
         }
     }
-    Ok(ExitCode::SUCCESS)
+    text
+}
+
+fn full(d: &Declaration, registry: &Registry) -> String {
+    let mut text = format!("{} {} {}\n  {}\n", d.kind.name(), d.name, d.version, d.description);
+    if let Some(shader) = registry.shaders().get(&d.name).filter(|_| d.kind == Kind::Shader) {
+        _ = writeln!(text, "  composited by {}", shader.compositing.name());
+    }
+    let what = if matches!(d.kind, Kind::Action | Kind::Loader) { "option" } else { "parameter" };
+    if d.parameters.is_empty() {
+        _ = writeln!(text, "\n  no {what}s");
+    } else {
+        _ = writeln!(text, "\n  {what}s");
+        d.parameters.iter().for_each(|p| text.push_str(&parameter(p)));
+    }
+    text
+}
+
+/// `name  types, required or default, bounds or choices, unit` and below it what it does.
+fn parameter(p: &ParameterDecl) -> String {
+    let types = p.types.iter().map(|t| t.name()).collect::<Vec<_>>().join(" or ");
+    let mut facts = vec![types];
+    facts.push(match (&p.default, p.required) {
+        (Some(value), _) => format!("default {value}"),
+        (None, true) => "required".into(),
+        (None, false) => "optional".into(),
+    });
+    facts.extend(p.bounds.map(bounds));
+    if !p.choices.is_empty() {
+        facts.push(format!("one of {}", p.choices.join(", ")));
+    }
+    if !p.unit.is_empty() {
+        facts.push(format!("in {}", p.unit));
+    }
+    let description = p.description.split_whitespace().collect::<Vec<_>>().join(" ");
+    format!("    {}: {}\n        {description}\n", p.name, facts.join("; "))
+}
+
+fn bounds([lowest, highest]: [f64; 2]) -> String {
+    let positive = lowest > 0.0 && lowest < 1e-300;
+    match (positive, highest >= f64::MAX) {
+        (true, true) => "above 0".into(),
+        (true, false) => format!("above 0, at most {highest}"),
+        (false, true) => format!("at least {lowest}"),
+        (false, false) => format!("{lowest} to {highest}"),
+    }
 }

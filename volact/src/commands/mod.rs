@@ -1,11 +1,16 @@
-//! The subcommands, one module each.
+//! The subcommands, one module each, and what they share: `source` (what to draw), `settings`,
+//! `progress`, `report`.
 
 pub mod bench;
 pub mod compare;
 pub mod completions;
 pub mod describe;
 pub mod info;
+pub mod progress;
 pub mod render;
+pub mod report;
+pub mod settings;
+pub mod source;
 
 use std::{
     io::Write,
@@ -35,6 +40,7 @@ pub enum Command {
 impl Command {
     /// Does it.
     pub fn run(self) -> anyhow::Result<ExitCode> {
+        report::listen();
         let registry = volact::with_builtins();
         match self {
             Self::Render(args) => render::run(args, &registry),

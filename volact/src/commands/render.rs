@@ -1,14 +1,103 @@
-//! `volact render`.
+//! `volact render`: draws a scene or a bare volume into a picture.
 
-use std::process::ExitCode;
+use std::{
+    path::{Path, PathBuf},
+    process::ExitCode,
+};
 
-use volact::Registry;
+use anyhow::bail;
+use volact::{FrameExt as _, Registry, save::PictureFormat};
+use volact_files::picture::PngOptions;
+
+use super::{progress::Line, report::Report, source, source::Source};
 
 /// Arguments of `volact render`.
 #[derive(clap::Args)]
-pub struct Args {}
+#[command(after_help = "Examples:\n  \
+    volact render head.nrrd                       a look that suits the data, into head.png\n  \
+    volact render head.nrrd --shader mip --view front --size 800x600 -o mip.png\n  \
+    volact render scene.ron --set unit_distance=2 --set 'skin.lookup_table=WindowLevel(window: 400, level: 40, opacity: 0.1)'\n  \
+    volact render scene.ron --action cpu --option classification=post --step 0.25 -o exact.exr\n\
+    Existing pictures are replaced; a picture appears whole or not at all. `volact describe` lists what names mean.")]
+pub struct Args {
+    #[command(flatten)]
+    source: source::Args,
+    /// The picture: .png, .exr or .npy [default: the input's name with .png, in the current folder]
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+    /// Write a PNG without background, with straight alpha
+    #[arg(long)]
+    straight_alpha: bool,
+    /// Write a PNG of 16 bits a channel
+    #[arg(long)]
+    sixteen_bit: bool,
+    /// Print the summary as JSON
+    #[arg(long)]
+    json: bool,
+}
 
-/// Runs it.
-pub fn run(_: Args, _: &Registry) -> anyhow::Result<ExitCode> {
+/// Draws, writes and prints a summary.
+pub fn run(args: Args, registry: &Registry) -> anyhow::Result<ExitCode> {
+    let output = match &args.output {
+        Some(path) => path.clone(),
+        None => default_output(&args.source.input)?,
+    };
+    let png = args.png(&output)?;
+    let mut source = Source::open(&args.source, registry)?;
+    let line = Line::new(format!("drawing with {}", source.choice.name));
+    let frame = source.draw()?;
+    drop(line);
+    frame.save_with(&output, png)?;
+    let report = Report { source: &source, frame: &frame, output: &output };
+    report.warn();
+    match args.json {
+        true => super::print(&format!("{:#}\n", report.to_json()))?,
+        false if super::quiet() => {}
+        false => super::print(&report.to_text())?,
+    }
     Ok(ExitCode::SUCCESS)
+}
+
+impl Args {
+    /// What a PNG shall be; all that can be said before drawing is said here.
+    fn png(&self, output: &Path) -> anyhow::Result<PngOptions> {
+        let format = PictureFormat::of(output)?;
+        if format != PictureFormat::Png && (self.straight_alpha || self.sixteen_bit) {
+            bail!("{}: --straight-alpha and --sixteen-bit are for .png; the others hold what was drawn", output.display());
+        }
+        let folder = output.parent().filter(|p| !p.as_os_str().is_empty());
+        if let Some(folder) = folder.filter(|p| !p.is_dir()) {
+            bail!("{}: the folder {} is not there", output.display(), folder.display());
+        }
+        Ok(PngOptions { over_background: !self.straight_alpha, sixteen_bit: self.sixteen_bit })
+    }
+}
+
+/// Extensions of inputs, those of compressed files first.
+const ENDINGS: [&str; 13] =
+    [".gz", ".ron", ".nrrd", ".nhdr", ".nii", ".mha", ".mhd", ".tif", ".tiff", ".vti", ".vtk", ".raw", ".dcm"];
+
+/// The input's name without its extension, as `.png` in the current folder.
+fn default_output(input: &Path) -> anyhow::Result<PathBuf> {
+    let name = input.file_name().map(|name| name.to_string_lossy().into_owned());
+    let Some(mut stem) = name else { bail!("{}: has no name to call the picture by; give one with -o", input.display()) };
+    for ending in ENDINGS {
+        stem = stem.strip_suffix(ending).filter(|s| !s.is_empty()).map_or(stem.clone(), str::to_owned);
+    }
+    Ok(PathBuf::from(stem + ".png"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn picture_is_called_like_its_input() {
+        let name = |input: &str| default_output(Path::new(input)).map(|p| p.display().to_string()).unwrap();
+        assert_eq!(name("scans/head.nrrd"), "head.png");
+        assert_eq!(name("brain.nii.gz"), "brain.png");
+        assert_eq!(name("series/"), "series.png");
+        assert_eq!(name("v1.2.raw"), "v1.2.png");
+        assert!(default_output(Path::new("..")).is_err());
+    }
 }
