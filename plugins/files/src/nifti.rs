@@ -11,7 +11,7 @@
 //!
 //! # Limits
 //! 64-bit integers, complex and 128-bit types, vectors in the fifth dimension and Analyze 7.5
-//! headers are refused. Header extensions are not used.
+//! headers are refused. Header extensions and `xyzt_units` are not used.
 
 use std::{
     io::{Cursor, Read},

@@ -12,7 +12,7 @@
 //!
 //! # Limits
 //! 64-bit integers, blocks, time axes and components that are not the first axis are refused.
-//! `measurement frame`, `old min` and key/value pairs are not used.
+//! `space units`, `measurement frame`, `old min` and key/value pairs are not used.
 
 use std::{collections::BTreeMap, path::Path};
 

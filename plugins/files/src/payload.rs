@@ -324,8 +324,9 @@ impl VolumeReader for GridReader {
         if region == Region::whole(self.desc.dims)
             && let Some(mapped) = self.map()?
         {
-            progress.advance(mapped.len() as u64, mapped.len() as u64);
-            return Ok(mapped);
+            let bytes = mapped.len() as u64;
+            let go_on = progress.advance(bytes, bytes);
+            return if go_on { Ok(mapped) } else { Err(LoadError::Stopped { path: self.path.clone() }) };
         }
         self.copy(region, progress).map(Buffer::from)
     }

@@ -29,7 +29,7 @@ use crate::{
     format::{Format, confidence, flag, name_of, spacing_given, spacing_option},
     payload::{ByteOrder, Encoding, swap_bytes, validate},
     series,
-    slices::{SliceReader, SliceSource},
+    slices::{SliceLayout, SliceReader, SliceSource},
     storage::{Input, Storage},
     world,
 };
@@ -63,21 +63,6 @@ pub(crate) fn folder_confidence(probe: &Probe<'_>, extensions: &[&str]) -> Confi
     if files.iter().any(|f| series::has_extension(f, extensions)) { Confidence::Extension } else { Confidence::No }
 }
 
-/// What all slices of a series share.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Layout {
-    width: u32,
-    height: u32,
-    scalar: ScalarType,
-    components: usize,
-}
-
-impl Layout {
-    fn bytes(self) -> u64 {
-        u64::from(self.width) * u64::from(self.height) * (self.components * self.scalar.size()) as u64
-    }
-}
-
 type Input0 = BufReader<Box<dyn Input>>;
 
 fn decoder(storage: &Storage, path: &Path, pixels: u64) -> Result<Decoder<Input0>, LoadError> {
@@ -92,7 +77,7 @@ fn failed(path: &Path, error: png::DecodingError) -> LoadError {
 }
 
 /// Reads a file's first chunk and checks that the file could hold its pixels.
-fn layout(storage: &Storage, path: &Path) -> Result<Layout, LoadError> {
+fn layout(storage: &Storage, path: &Path) -> Result<SliceLayout, LoadError> {
     let mut decoder = decoder(storage, path, 0)?;
     let info = decoder.read_header_info().map_err(|e| failed(path, e))?;
     let scalar = match info.bit_depth {
@@ -113,7 +98,7 @@ fn layout(storage: &Storage, path: &Path) -> Result<Layout, LoadError> {
             return Err(LoadError::Unsupported { path: path.into(), what: "a palette".into(), cure });
         }
     };
-    let layout = Layout { width: info.width, height: info.height, scalar, components };
+    let layout = SliceLayout { width: info.width, height: info.height, scalar, components };
     let size = storage.length(path)?;
     if layout.bytes() > Encoding::Zlib.most(size) {
         let what = format!("PNG, enough for at most {} bytes of pixels", Encoding::Zlib.most(size));
@@ -141,16 +126,10 @@ fn open(storage: &Storage, path: &Path, options: &LoadOptions) -> Result<Box<dyn
     Ok(Box::new(SliceReader { path: path.into(), desc, warnings: Vec::new(), source }))
 }
 
-impl Layout {
-    fn describe(self) -> String {
-        format!("{} x {}, {} of {}", self.width, self.height, self.components, self.scalar)
-    }
-}
-
 struct Files {
     storage: Storage,
     files: Vec<PathBuf>,
-    layout: Layout,
+    layout: SliceLayout,
 }
 
 impl SliceSource for Files {

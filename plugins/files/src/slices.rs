@@ -2,9 +2,31 @@
 
 use std::path::PathBuf;
 
-use volact_core::{Buffer, LoadError, Progress, Region, VolumeDesc, VolumeReader, Warning};
+use volact_core::{Buffer, LoadError, Progress, Region, ScalarType, VolumeDesc, VolumeReader, Warning};
 
 use crate::payload::{check_region, crop_slice, reserve};
+
+/// What all slices of a series share.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct SliceLayout {
+    pub(crate) width: u32,
+    pub(crate) height: u32,
+    pub(crate) scalar: ScalarType,
+    pub(crate) components: usize,
+}
+
+impl SliceLayout {
+    /// Bytes of a slice. Two 32-bit sizes and a sample of several bytes can be more than 64 bits hold.
+    pub(crate) fn bytes(self) -> u64 {
+        let pixels = u64::from(self.width) * u64::from(self.height);
+        pixels.saturating_mul((self.components * self.scalar.size()) as u64)
+    }
+
+    /// The layout in words.
+    pub(crate) fn describe(self) -> String {
+        format!("{} x {}, {} of {}", self.width, self.height, self.components, self.scalar)
+    }
+}
 
 /// Decodes single slices.
 pub(crate) trait SliceSource: Send {

@@ -13,8 +13,8 @@
 //!
 //! # Limits
 //! Palettes, YCbCr, planar samples, JPEG and fax compression, 64-bit integers, ImageJ's
-//! hyperstacks and its stacks of a single page are refused. White-is-zero images are inverted, as
-//! their numbers mean.
+//! hyperstacks and its stacks of a single page are refused. The orientation tag is not used.
+//! White-is-zero images are inverted, as their numbers mean.
 
 use std::{
     io::{BufReader, ErrorKind},
@@ -37,7 +37,7 @@ use crate::{
     payload::validate,
     png_series::{folder_confidence, series_option},
     series,
-    slices::{SliceReader, SliceSource},
+    slices::{SliceLayout, SliceReader, SliceSource},
     storage::{Input, Storage},
     world,
 };
@@ -63,25 +63,6 @@ fn probe(probe: &Probe<'_>) -> Confidence {
 
 type Pages = Decoder<BufReader<Box<dyn Input>>>;
 
-/// What all pages share.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Layout {
-    width: u32,
-    height: u32,
-    scalar: ScalarType,
-    components: usize,
-}
-
-impl Layout {
-    fn bytes(self) -> u64 {
-        u64::from(self.width) * u64::from(self.height) * (self.components * self.scalar.size()) as u64
-    }
-
-    fn describe(self) -> String {
-        format!("{} x {}, {} of {}", self.width, self.height, self.components, self.scalar)
-    }
-}
-
 fn failed(path: &Path, error: TiffError) -> LoadError {
     let message = match &error {
         TiffError::IoError(e) if e.kind() == ErrorKind::UnexpectedEof => "the file ends too early".into(),
@@ -101,7 +82,7 @@ fn decoder(storage: &Storage, path: &Path) -> Result<Pages, LoadError> {
     Ok(decoder.with_limits(limits))
 }
 
-fn layout(path: &Path, size: u64, pages: &mut Pages) -> Result<Layout, LoadError> {
+fn layout(path: &Path, size: u64, pages: &mut Pages) -> Result<SliceLayout, LoadError> {
     let fail = |e| failed(path, e);
     let unsupported =
         |what: String, cure: &str| Err(LoadError::Unsupported { path: path.into(), what, cure: cure.into() });
@@ -136,7 +117,7 @@ fn layout(path: &Path, size: u64, pages: &mut Pages) -> Result<Layout, LoadError
     let Some(scalar) = scalar else {
         return unsupported(format!("a sample of {bits} bits"), "save it with 8, 16 or 32 bits");
     };
-    let layout = Layout { width, height, scalar, components };
+    let layout = SliceLayout { width, height, scalar, components };
     if layout.bytes() > size.saturating_mul(MOST_RATIO) {
         let what = format!("TIFF, enough for at most {} bytes of pixels", size.saturating_mul(MOST_RATIO));
         return Err(LoadError::Truncated { path: path.into(), what, found: size, wanted: layout.bytes() });
@@ -146,7 +127,7 @@ fn layout(path: &Path, size: u64, pages: &mut Pages) -> Result<Layout, LoadError
 
 fn open(storage: &Storage, path: &Path, options: &LoadOptions) -> Result<Box<dyn VolumeReader>, LoadError> {
     let files = series::find(storage, path, &EXTENSIONS, flag(options, "series"))?;
-    let mut first: Option<Layout> = None;
+    let mut first: Option<SliceLayout> = None;
     let mut count = 0;
     let mut spacing = DVec3::ONE;
     for file in &files {
@@ -201,7 +182,7 @@ fn open(storage: &Storage, path: &Path, options: &LoadOptions) -> Result<Box<dyn
     Ok(Box::new(SliceReader { path: path.into(), desc, warnings: Vec::new(), source }))
 }
 
-fn shared_bytes(layout: Option<Layout>, pages: u64) -> u64 {
+fn shared_bytes(layout: Option<SliceLayout>, pages: u64) -> u64 {
     layout.map_or(0, |l| l.bytes().saturating_mul(pages))
 }
 
@@ -238,7 +219,7 @@ fn imagej(path: &Path, pages: &mut Pages) -> Result<DVec3, LoadError> {
 struct Stack {
     storage: Storage,
     files: Vec<PathBuf>,
-    layout: Layout,
+    layout: SliceLayout,
     /// The decoder of the one file, if there is only one.
     open: Option<Pages>,
 }

@@ -6,7 +6,7 @@ use std::{path::Path, sync::Mutex};
 
 use samples::{DIMS, Sample, all};
 use volact_core::{
-    LoadError, ParameterValue, Progress, Region, Volume, VolumeReader,
+    LoadError, ParameterValue, Progress, Region, ScalarType, Volume, VolumeReader,
     glam::DVec3,
     loader::{Confidence, LoadOptions, NoProgress, Probe},
 };
@@ -148,6 +148,41 @@ fn slope_intercept_and_unit_are_carried() {
     assert_eq!(map("nrrd raw"), (1.0, 0.0, String::new()));
 }
 
+proptest::proptest! {
+    /// Any numbers in any small grid, in each encoding and byte order, come back as they were.
+    #[test]
+    fn nrrd_round_trips(
+        dims in [1usize..6, 1usize..6, 1usize..6],
+        seed in proptest::collection::vec(proptest::num::i32::ANY, 125),
+        kind in 0usize..4,
+        encoding in 0usize..5,
+        big in proptest::bool::ANY,
+    ) {
+        let scalar = [ScalarType::U8, ScalarType::I16, ScalarType::U16, ScalarType::I32][kind];
+        let word = ["uchar", "short", "ushort", "int"][kind];
+        let count = dims.iter().product::<usize>();
+        let [low, high] = scalar.limits().unwrap();
+        let values: Vec<i32> = seed[..count].iter().map(|v| low as i32 + v.rem_euclid((high - low).min(2e9) as i32)).collect();
+        let bytes = if big { samples::big(&values, scalar) } else { samples::little(&values, scalar) };
+        let (name, data) = match encoding {
+            0 => ("raw", bytes),
+            1 => ("gzip", samples::gzip(&bytes)),
+            2 => ("bzip2", samples::bzip2(&bytes)),
+            3 => ("hex", bytes.iter().map(|b| format!("{b:02X}")).collect::<String>().into_bytes()),
+            _ => ("ascii", values.iter().map(|v| format!("{v}\n")).collect::<String>().into_bytes()),
+        };
+        let header = format!(
+            "NRRD0003\r\ntype: {word}\r\ndimension: 3\r\nsizes: {} {} {}\r\nencoding: {name}\r\nendian: {}\r\n\r\n",
+            dims[0], dims[1], dims[2], if big { "big" } else { "little" },
+        );
+        let storage = Storage::memory([("v.nrrd", samples::join(&header, &data))]);
+        let mut reader = open_in(&storage, "nrrd", Path::new("v.nrrd"), &LoadOptions::new()).unwrap();
+        proptest::prop_assert_eq!(reader.desc().dims, dims);
+        let read = reader.read(&NoProgress).unwrap();
+        proptest::prop_assert_eq!(read.bytes(), samples::native(&values, scalar));
+    }
+}
+
 fn confidences(path: &str, head: &[u8]) -> Vec<(String, Confidence)> {
     let probe = Probe { path: Path::new(path), head, is_dir: false };
     let all = loaders();
@@ -204,14 +239,14 @@ fn array_option_picks_by_name() {
     let head = samples::vtk_header("3.0", "BINARY", data);
     let second = "\nSCALARS second short\nLOOKUP_TABLE default\n";
     let values = samples::grid(1);
-    let file = [head.as_bytes(), &[9; 60], second.as_bytes(), &samples::big(&values, volact_core::ScalarType::I16)];
+    let file = [head.as_bytes(), &[9; 60], second.as_bytes(), &samples::big(&values, ScalarType::I16)];
     let storage = Storage::memory([("v.vtk", file.concat())]);
     let read = |given: &[(&str, ParameterValue)]| {
         let mut reader = open_in(&storage, "vtk", Path::new("v.vtk"), &options(given)).unwrap();
         reader.read(&NoProgress).unwrap().bytes().to_vec()
     };
     assert_eq!(read(&[]), [9; 60]);
-    assert_eq!(read(&[("array", "second".into())]), samples::native(&values, volact_core::ScalarType::I16));
+    assert_eq!(read(&[("array", "second".into())]), samples::native(&values, ScalarType::I16));
 }
 
 #[test]
@@ -219,7 +254,7 @@ fn frame_option_reads_a_later_volume() {
     let values = samples::grid(1);
     let mut header = samples::nifti1(2, 8, b"n+1\0", false);
     header[40..50].copy_from_slice(&[4, 0, 5, 0, 4, 0, 3, 0, 2, 0]);
-    let second = samples::little(&values, volact_core::ScalarType::U8);
+    let second = samples::little(&values, ScalarType::U8);
     let plain = [&header[..], &[0; 4], &[7; 60], &second].concat();
     for bytes in [plain.clone(), samples::gzip(&plain)] {
         let storage = Storage::memory([("v.nii", bytes)]);

@@ -120,3 +120,14 @@ fn seeds_are_written_where_asked() {
         std::fs::write(target.join(sample.name.replace(' ', "_")), bytes).unwrap();
     }
 }
+
+/// Found by fuzzing: 2^32 × 2^32 pixels of three bytes overflowed the number of bytes.
+#[test]
+fn png_of_more_bytes_than_64_bits_count_is_refused() {
+    let mut bytes = b"\x89PNG\r\n\x1a\n\0\0\0\x0dIHDR\xf0\x80\0\x07\xff\x98\xef\xff\x08\x02\0\0\0".to_vec();
+    bytes.extend(b"\x88\x6a\x18\x72\0\0\0\0IDAT");
+    let storage = Storage::memory([("v.png", bytes)]);
+    let error = open_in(&storage, "png", Path::new("v.png"), &LoadOptions::new()).err().unwrap().to_string();
+    let wanted = "v.png: holds 41 bytes of PNG, enough for at most 42312 bytes of pixels, wanted 18446744073709551615";
+    assert_eq!(error, wanted);
+}
