@@ -20,6 +20,7 @@ use super::{
 
 /// Arguments that say what to draw and how; shared by commands that draw.
 #[derive(clap::Args)]
+#[group(skip)]
 pub struct Args {
     /// A scene (.ron), or a volume: a file, or a folder with a series
     #[arg(value_name = "SCENE.ron | VOLUME")]
@@ -79,8 +80,7 @@ impl Source {
     pub fn open(args: &Args, registry: &Registry) -> anyhow::Result<Self> {
         let config = settings::config(args.config.clone())?;
         let given = args.options()?;
-        let is_scene = args.input.extension().is_some_and(|e| e.eq_ignore_ascii_case("ron"));
-        let (scene, notes) = match is_scene {
+        let (scene, notes) = match args.is_scene() {
             true => (args.scene(registry, &config)?, Vec::new()),
             false => args.volume(registry, &config)?,
         };
@@ -105,6 +105,12 @@ impl Source {
 }
 
 impl Args {
+    /// Whether the input is a scene: `.ron`, but not the `.raw.ron` that describes raw voxels.
+    fn is_scene(&self) -> bool {
+        let name = self.input.file_name().map(|name| name.to_string_lossy().to_lowercase()).unwrap_or_default();
+        name.ends_with(".ron") && !name.ends_with(".raw.ron")
+    }
+
     fn options(&self) -> anyhow::Result<Options> {
         let mut options = settings::options(&self.option)?;
         if let Some(step) = self.step {
