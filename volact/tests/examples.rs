@@ -1,0 +1,117 @@
+//! Every example has a picture, and the picture is a test.
+//!
+//! - The data are what `examples/generate.rs` says.
+//! - Each scene, drawn by `cpu` as it stands, is its stored picture within a step of 8 bits: the
+//!   picture shows what a user gets.
+//! - That `cpu` is right is not proved by a picture of its own making: each scene is drawn small
+//!   by `cpu` and by `reference`, too.
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
+
+use volact::{
+    Frame, Options, Registry,
+    core::{loader::NoProgress, scene::Scene},
+    metrics::{self, Image},
+};
+use volact_files::picture;
+
+#[path = "../../examples/generate.rs"]
+mod generate;
+
+/// The scenes, without `.ron`; their pictures have the same name with `.png`, except that
+/// `scene.ron` gives `picture.png`.
+const SCENES: [&str; 7] = [
+    "signal/scene",
+    "head/scene",
+    "part/scene",
+    "volumizer/whole",
+    "volumizer/carved",
+    "volumizer/roi",
+    "volumizer/tables",
+];
+
+/// Most bytes of all examples together.
+const MOST_BYTES: u64 = 3_000_000;
+
+fn examples() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples")
+}
+
+fn picture_of(name: &str) -> PathBuf {
+    examples().join(format!("{}.png", name.replace("/scene", "/picture")))
+}
+
+fn open(name: &str, registry: &Registry) -> Scene {
+    let path = examples().join(format!("{name}.ron"));
+    Scene::open(&path, registry, &NoProgress).unwrap_or_else(|e| panic!("{name}: {e}"))
+}
+
+fn draw(scene: &Scene, action: &str, registry: &Registry) -> Frame {
+    let mut action = registry.action(action, &Options::new()).unwrap();
+    scene.shapes.iter().for_each(|shape| action.manage(shape).unwrap());
+    action.begin_draw(&scene.frame).unwrap();
+    scene.shapes.iter().for_each(|shape| action.draw(shape).unwrap());
+    action.end_draw().unwrap()
+}
+
+#[test]
+fn data_are_by_rule() {
+    for example in generate::EXAMPLES {
+        let stored = fs::read(examples().join(example.path)).unwrap();
+        let made = example.nrrd();
+        assert_eq!(stored.len(), made.len(), "{}", example.path);
+        // Sines may differ in the last place from machine to machine, and round to the next number.
+        let differing = stored.iter().zip(&made).filter(|(a, b)| a.abs_diff(**b) > 1).count();
+        assert_eq!(differing, 0, "{}", example.path);
+    }
+}
+
+#[test]
+fn pictures_are_what_a_user_gets() {
+    let registry = volact::with_builtins();
+    for name in SCENES {
+        let frame = draw(&open(name, &registry), "cpu", &registry);
+        let fresh = frame.over_background();
+        let stored = picture::load_picture(&picture_of(name)).unwrap();
+        let (a, b) = (&stored.rgba, &fresh);
+        let image = |rgba| Image { width: frame.width, height: frame.height, rgba };
+        let stored = Image { width: stored.width, height: stored.height, rgba: a };
+        let found = metrics::compare(&stored, &image(b)).unwrap();
+        assert!(found.max <= 1.0 / 255.0, "{name}: {} at {:?}", found.max, found.worst);
+        let seen = fresh.iter().filter(|p| p[0].max(p[1]).max(p[2]) > 0.1).count() as f64 / fresh.len() as f64;
+        assert!((0.1..0.9).contains(&seen), "{name}: {seen} of the picture is lit: empty, or a filled box");
+    }
+}
+
+#[test]
+fn pictures_are_right() {
+    let registry = volact::with_builtins();
+    for name in SCENES {
+        let mut scene = open(name, &registry);
+        let (width, height) = (scene.frame.width, scene.frame.height);
+        (scene.frame.width, scene.frame.height) = (16, 16 * height / width);
+        let [cpu, truth] = ["cpu", "reference"].map(|action| draw(&scene, action, &registry));
+        let image = |frame: &Frame| frame.color.clone();
+        let (a, b) = (image(&cpu), image(&truth));
+        let sized = |rgba| Image { width: cpu.width, height: cpu.height, rgba };
+        let found = metrics::compare(&sized(&a), &sized(&b)).unwrap();
+        assert!(found.max < 0.02 && found.rmse < 0.004, "{name}: max {}, rmse {}", found.max, found.rmse);
+    }
+}
+
+#[test]
+fn examples_are_small_and_complete() {
+    let mut bytes = 0;
+    let mut scenes = 0;
+    for folder in fs::read_dir(examples()).unwrap().map(|e| e.unwrap().path()).filter(|p| p.is_dir()) {
+        for file in fs::read_dir(folder).unwrap().map(|e| e.unwrap()) {
+            bytes += file.metadata().unwrap().len();
+            scenes += usize::from(file.path().extension().is_some_and(|e| e == "ron"));
+        }
+    }
+    assert!(bytes < MOST_BYTES, "{bytes}");
+    assert_eq!(scenes, SCENES.len());
+}
