@@ -18,7 +18,7 @@ use super::{
     dispatch, general,
     options::{Settings, declaration},
     over,
-    packet::{Packet, Place, SIDE},
+    packet::{Place, Rays, SIDE},
     reduce,
     resources::{Resources, voxels},
     simd::LANES,
@@ -258,9 +258,9 @@ fn uses_general(drawn: &[&ResolvedShape]) -> bool {
 
 /// One way of drawing a band of the picture.
 enum Pass<'a> {
-    Over { job: over::Job<'a>, place: Place },
+    Over { job: over::Job<'a>, rays: Rays },
     General { layers: Vec<general::Layer<'a>> },
-    Reduce { job: reduce::Job<'a>, place: Place, units: Units, table: ResolvedTable, unit: f64 },
+    Reduce { job: reduce::Job<'a>, rays: Rays, units: Units, table: ResolvedTable, unit: f64 },
 }
 
 /// A picture to draw.
@@ -305,7 +305,7 @@ impl<'a> Picture<'a> {
                     termination: settings.termination as f32,
                     threshold: open.desc.depth_threshold,
                 };
-                passes.push(Pass::Over { job, place });
+                passes.push(Pass::Over { job, rays: Rays::new(&grid, place) });
             }
         }
         for shape in drawn.iter().copied().filter(|s| s.compositing() != Compositing::Over) {
@@ -316,7 +316,8 @@ impl<'a> Picture<'a> {
             let job = reduce::Job { voxels, lattice, compositing, bounds, empty: resources.empty(shape.id) };
             let grey = || LookupTable::grey(texture.range());
             let table = shape.table("lookup_table").cloned().unwrap_or_else(grey).resolve(texture.range());
-            passes.push(Pass::Reduce { job, place, units, table, unit: shape.float("unit_distance").unwrap_or(1.0) });
+            let rays = Rays::new(&grid, place);
+            passes.push(Pass::Reduce { job, rays, units, table, unit: shape.float("unit_distance").unwrap_or(1.0) });
         }
         let threshold = open.desc.depth_threshold;
         Ok(Self { grid, viewport, passes, settings: *settings, lattice, threshold })
@@ -384,11 +385,10 @@ impl<'a> Picture<'a> {
         let size = [self.viewport.width, self.viewport.height];
         let unit = self.settings.unit;
         match pass {
-            Pass::Over { job, place } => {
-                let packet = Packet::new(&self.grid, place, at, size);
-                if packet.active != 0 {
-                    *pixels = dispatch::draw(unit, job, &packet, counts);
-                    *zero = packet.depth_zero;
+            Pass::Over { job, rays } => {
+                if let Some(drawn) = dispatch::draw(unit, job, rays, dispatch::At { pixel: at, size }, counts) {
+                    *pixels = drawn;
+                    *zero = [self.grid.linear().depth_zero; LANES];
                 }
             }
             Pass::General { layers } => {
@@ -404,12 +404,9 @@ impl<'a> Picture<'a> {
                     }
                 }
             }
-            Pass::Reduce { job, place, units, table, unit: distance } => {
-                let packet = Packet::new(&self.grid, place, at, size);
-                if packet.active == 0 {
-                    return;
-                }
-                let reduced = dispatch::reduce(unit, job, &packet, counts);
+            Pass::Reduce { job, rays, units, table, unit: distance } => {
+                let at = dispatch::At { pixel: at, size };
+                let Some(reduced) = dispatch::reduce(unit, job, rays, at, counts) else { return };
                 for (pixel, r) in pixels.color.iter_mut().zip(reduced) {
                     if r.length > 0.0 {
                         *pixel = lay_over(*pixel, classify(job.compositing, r, *units, table, *distance));

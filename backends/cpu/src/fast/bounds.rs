@@ -11,6 +11,9 @@ use volact_core::ScalarType;
 /// Cells of a block along each axis.
 pub const BLOCK: usize = 4;
 
+/// Blocks of a coarse block along each axis.
+pub const COARSE: usize = 4;
+
 /// Bounds of all blocks.
 #[derive(Clone, Debug)]
 pub struct ValueBounds {
@@ -22,6 +25,9 @@ pub struct ValueBounds {
     /// Lower and upper bound of each block in steps of `range`/255, rounded outward; `[255, 0]`
     /// where a block holds no number.
     quantised: Vec<[u8; 2]>,
+    /// Coarse blocks along each axis, and their bounds.
+    pub coarse_blocks: [usize; 3],
+    coarse: Vec<[u8; 2]>,
     /// Whether numbers may be infinite: then the outermost steps have no outer end.
     float: bool,
 }
@@ -44,10 +50,18 @@ impl ValueBounds {
         let float = voxels.scalar.is_float();
         // One more, so that four bytes can be read at the last.
         let mut quantised = vec![[255u8, 0]; slab * blocks[2] + 1];
-        let Some(range) = data_range(voxels, threads) else { return Self { blocks, range: None, quantised, float } };
+        let coarse_blocks = blocks.map(|n| n.div_ceil(COARSE));
+        let coarse = vec![[255u8, 0]; coarse_blocks.iter().product::<usize>() + 1];
+        let mut bounds = Self { blocks, range: None, quantised, coarse_blocks, coarse, float };
+        bounds.range = match voxels.scalar.limits() {
+            // Every number of an 8-bit type is a step of its own.
+            Some([lo, hi]) if voxels.scalar.size() == 1 => Some([lo as f32, hi as f32]),
+            _ => data_range(voxels, threads),
+        };
+        let Some(range) = bounds.range else { return bounds };
         let per_thread = blocks[2].div_ceil(threads.max(1));
         std::thread::scope(|scope| {
-            for (i, part) in quantised[..slab * blocks[2]].chunks_mut(per_thread * slab).enumerate() {
+            for (i, part) in bounds.quantised[..slab * blocks[2]].chunks_mut(per_thread * slab).enumerate() {
                 scope.spawn(move || {
                     for (j, layer) in part.chunks_mut(slab).enumerate() {
                         bound_layer(voxels, blocks, i * per_thread + j, range, layer);
@@ -55,12 +69,33 @@ impl ValueBounds {
                 });
             }
         });
-        Self { blocks, range: Some(range), quantised, float }
+        bounds.make_coarse();
+        bounds
+    }
+
+    fn make_coarse(&mut self) {
+        let ([nx, ny, nz], [cx, cy, _]) = (self.blocks, self.coarse_blocks);
+        for z in 0..nz {
+            for y in 0..ny {
+                let row = &self.quantised[(z * ny + y) * nx..][..nx];
+                let coarse = &mut self.coarse[(z / COARSE * cy + y / COARSE) * cx..][..cx];
+                for (into, part) in coarse.iter_mut().zip(row.chunks(COARSE)) {
+                    for &[lo, hi] in part {
+                        *into = [into[0].min(lo), into[1].max(hi)];
+                    }
+                }
+            }
+        }
+    }
+
+    /// Bounds of coarse blocks, as [`steps`](Self::steps).
+    pub fn coarse(&self) -> &[[u8; 2]] {
+        &self.coarse
     }
 
     /// Bytes held.
     pub fn bytes(&self) -> usize {
-        self.quantised.len() * 2
+        (self.quantised.len() + self.coarse.len()) * 2
     }
 
     /// Lower and upper bound of a block in steps; the lower one above the upper where it is empty.
@@ -108,50 +143,53 @@ impl Emptiness {
     }
 }
 
-/// Chebyshev distance transform: exact, because the unit ball is a product of intervals: one
-/// axis at a time, `d(i) = min over j of max(d(j), |i − j|)`, by a forward and a backward sweep
-/// of 1 + minimum over the 26 neighbours (Borgefors 1986, with all weights 1).
+/// Chebyshev distance transform by a forward and a backward sweep of 1 + minimum over the 26
+/// neighbours, exact for this metric (Borgefors 1986), row by row.
 fn spread(distance: &mut [u8], [nx, ny, nz]: [usize; 3]) {
-    let row = nx;
-    let slab = nx * ny;
-    let mut relax = |x: usize, y: usize, z: usize, forward: bool| {
-        let i = z * slab + y * row + x;
-        let mut best = distance[i];
-        if best == 0 {
-            return;
+    let rows = ny * nz;
+    for i in 0..rows {
+        let (before, rest) = distance.split_at_mut(i * nx);
+        let row = &mut rest[..nx];
+        let (y, z) = (i % ny, i / ny);
+        let mut near = |y: usize, z: usize| lower(row, &before[(z * ny + y) * nx..][..nx]);
+        if y > 0 {
+            near(y - 1, z);
         }
-        let mut look = |dx: isize, dy: isize, dz: isize| {
-            let (x, y, z) = (x as isize + dx, y as isize + dy, z as isize + dz);
-            if x >= 0 && y >= 0 && z >= 0 && x < nx as isize && y < ny as isize && z < nz as isize {
-                let v = distance[z as usize * slab + y as usize * row + x as usize];
-                best = best.min(v.saturating_add(1));
-            }
-        };
-        let s = if forward { -1 } else { 1 };
-        for dy in -1..=1 {
-            for dx in -1..=1 {
-                look(dx, dy, s);
-            }
+        if z > 0 {
+            (y.saturating_sub(1)..(y + 2).min(ny)).for_each(|y| near(y, z - 1));
         }
-        for dx in -1..=1 {
-            look(dx, s, 0);
-        }
-        look(s, 0, 0);
-        distance[i] = best;
-    };
-    for z in 0..nz {
-        for y in 0..ny {
-            for x in 0..nx {
-                relax(x, y, z, true);
-            }
+        for x in 1..nx {
+            row[x] = row[x].min(row[x - 1].saturating_add(1));
         }
     }
-    for z in (0..nz).rev() {
-        for y in (0..ny).rev() {
-            for x in (0..nx).rev() {
-                relax(x, y, z, false);
-            }
+    for i in (0..rows).rev() {
+        let (head, after) = distance.split_at_mut((i + 1) * nx);
+        let row = &mut head[i * nx..];
+        let (y, z) = (i % ny, i / ny);
+        let mut near = |y: usize, z: usize| lower(row, &after[(z * ny + y - i - 1) * nx..][..nx]);
+        if y + 1 < ny {
+            near(y + 1, z);
         }
+        if z + 1 < nz {
+            (y.saturating_sub(1)..(y + 2).min(ny)).for_each(|y| near(y, z + 1));
+        }
+        for x in (1..nx).rev() {
+            row[x - 1] = row[x - 1].min(row[x].saturating_add(1));
+        }
+    }
+}
+
+/// Lowers a row to 1 + the minimum over three neighbours in another row.
+fn lower(row: &mut [u8], other: &[u8]) {
+    let n = row.len();
+    for (r, o) in row.iter_mut().zip(other) {
+        *r = (*r).min(o.saturating_add(1));
+    }
+    for (r, o) in row[1..].iter_mut().zip(&other[..n - 1]) {
+        *r = (*r).min(o.saturating_add(1));
+    }
+    for (r, o) in row[..n - 1].iter_mut().zip(&other[1..]) {
+        *r = (*r).min(o.saturating_add(1));
     }
 }
 
@@ -161,21 +199,21 @@ fn bound_layer(voxels: &Voxels<'_>, blocks: [usize; 3], bz: usize, [lo, hi]: [f3
         let first = voxels.min[a] + b * BLOCK;
         first..=(first + BLOCK).min(voxels.max[a])
     };
-    let mut columns = vec![[f32::INFINITY, f32::NEG_INFINITY]; voxels.max[0] - voxels.min[0] + 1];
+    let n = voxels.max[0] - voxels.min[0] + 1;
+    let (mut low, mut high) = (vec![f32::INFINITY; n], vec![f32::NEG_INFINITY; n]);
     for by in 0..blocks[1] {
-        columns.fill([f32::INFINITY, f32::NEG_INFINITY]);
+        low.fill(f32::INFINITY);
+        high.fill(f32::NEG_INFINITY);
         for z in span(bz, 2) {
             for y in span(by, 1) {
-                bound_row(voxels, y, z, &mut columns);
+                bound_row(voxels, y, z, &mut low, &mut high);
             }
         }
         for bx in 0..blocks[0] {
-            let part = &columns[bx * BLOCK..=(bx * BLOCK + BLOCK).min(columns.len() - 1)];
+            let part = bx * BLOCK..=(bx * BLOCK + BLOCK).min(n - 1);
             let [a, b] = &mut raw[by * blocks[0] + bx];
-            for c in part {
-                *a = a.min(c[0]);
-                *b = b.max(c[1]);
-            }
+            *a = low[part.clone()].iter().fold(*a, |m, &v| if v < m { v } else { m });
+            *b = high[part].iter().fold(*b, |m, &v| if v > m { v } else { m });
         }
     }
     let scale = if hi > lo { 255.0 / (f64::from(hi) - f64::from(lo)) } else { 0.0 };
@@ -233,12 +271,11 @@ macro_rules! each {
     };
 }
 
-fn bound_row(voxels: &Voxels<'_>, y: usize, z: usize, columns: &mut [[f32; 2]]) {
+fn bound_row(voxels: &Voxels<'_>, y: usize, z: usize, low: &mut [f32], high: &mut [f32]) {
     each!(voxels, y, z, |x, v| {
-        let c = &mut columns[x];
         // Comparisons are false for NaN, which is transparent and bounds nothing.
-        c[0] = if v < c[0] { v } else { c[0] };
-        c[1] = if v > c[1] { v } else { c[1] };
+        low[x] = if v < low[x] { v } else { low[x] };
+        high[x] = if v > high[x] { v } else { high[x] };
     });
 }
 

@@ -4,7 +4,7 @@
 //! ends of a ray's interval take the power of their true length.
 #![expect(unsafe_code, reason = "kernels of a vector unit")]
 
-use volact_core::lattice::{Lattice, Segment};
+use volact_core::lattice::Lattice;
 
 use super::{
     bounds::Emptiness,
@@ -13,7 +13,7 @@ use super::{
     packet::Packet,
     preintegrate::SegmentPairs,
     simd::{LANES, Simd},
-    walk::{ALL, CHUNK, Counts, Kernel, walk},
+    walk::{CHUNK, Counts, Kernel, around, walk},
 };
 
 /// One shape to draw.
@@ -57,24 +57,24 @@ impl Default for Pixels {
 #[inline(always)]
 pub unsafe fn draw<S: Simd, F: Fetch>(job: &Job<'_>, packet: &Packet, counts: &mut Counts) -> Pixels {
     let mut pixels = Pixels::default();
-    let cuts = packet.split(&job.lattice);
+    let cuts = packet.split(job.lattice.step);
     counts.rays += u64::from(packet.active.count_ones());
-    counts.lattice += (0..LANES).map(|l| (cuts.to[l] - cuts.from[l]).max(0) as u64).sum::<u64>();
+    counts.lattice += cuts.count();
     let blocks = job.empty.map(|e| e.blocks);
     // SAFETY: the caller's promises.
     unsafe {
-        ends::<S, F>(job, packet, &cuts.first, !ALL, &mut pixels, counts);
+        ends::<S, F>(job, packet, &cuts.front, 0, &mut pixels, counts);
         let step = job.lattice.step;
         let done = if let Some(pairs) = job.pairs {
             let mut kernel = PairKernel::<S>::new(job, pairs, &mut pixels);
-            walk::<S, F, _>(&mut kernel, &job.voxels, packet, &cuts, step, blocks, 0, counts);
+            walk::<S, F, _>(&mut kernel, &job.voxels, packet, &cuts, step, blocks, counts);
             kernel.shared.finish()
         } else {
             let mut kernel = SampleKernel::<S>::new(job, &mut pixels);
-            walk::<S, F, _>(&mut kernel, &job.voxels, packet, &cuts, step, blocks, 0, counts);
+            walk::<S, F, _>(&mut kernel, &job.voxels, packet, &cuts, step, blocks, counts);
             kernel.shared.finish()
         };
-        ends::<S, F>(job, packet, &cuts.last, done, &mut pixels, counts);
+        ends::<S, F>(job, packet, &cuts.back, done, &mut pixels, counts);
     }
     pixels
 }
@@ -84,35 +84,50 @@ pub unsafe fn draw<S: Simd, F: Fetch>(job: &Job<'_>, packet: &Packet, counts: &m
 unsafe fn ends<S: Simd, F: Fetch>(
     job: &Job<'_>,
     packet: &Packet,
-    cut: &[Option<Segment>; LANES],
+    cut: &[[f64; 2]; LANES],
     done: u32,
     pixels: &mut Pixels,
     counts: &mut Counts,
 ) {
-    let wanted = |l: &usize| cut[*l].is_some() && (done >> *l & 1 == 0 || done == !ALL);
-    let Some(lead) = (0..LANES).find(wanted) else { return };
-    // SAFETY: the caller's promises.
+    let mut wanted = 0u32;
+    for l in 0..LANES {
+        wanted |= u32::from(cut[l][0] < cut[l][1]) << l;
+    }
+    wanted &= !done;
+    if wanted == 0 {
+        return;
+    }
+    counts.samples += u64::from(wanted.count_ones());
+    counts.lattice += u64::from(wanted.count_ones());
+    let lead = wanted.trailing_zeros() as usize;
+    let mut entries = [[0f32; 4]; LANES];
+    // SAFETY: the caller's promises; indices lie in the tables.
     unsafe {
-        let entries = if let Some(pairs) = job.pairs {
-            let front = numbers::<S, F>(job, packet, lead, |l| cut[l].map(|s| s.start));
-            let back = numbers::<S, F>(job, packet, lead, |l| cut[l].map(|s| s.end));
-            std::array::from_fn(|l| pairs.lookup(front[l], back[l]))
+        let clear = S::load_quads(&entries);
+        let quads = if let Some(pairs) = job.pairs {
+            let front = numbers::<S, F>(job, packet, lead, |l| cut[l][0]);
+            let back = numbers::<S, F>(job, packet, lead, |l| cut[l][1]);
+            let (index, front, back) = pair_slots::<S>(pairs, front, back, wanted);
+            S::under_pairs(clear, pairs.entries.as_ptr().cast(), 16 * pairs.stride(), &index, &front, &back)
         } else {
-            let middle = numbers::<S, F>(job, packet, lead, |l| cut[l].map(|s| s.middle()));
-            middle.map(|v| job.table.lookup(v))
+            let middle = numbers::<S, F>(job, packet, lead, |l| 0.5 * (cut[l][0] + cut[l][1]));
+            let (index, fraction) = slots::<S>(job, middle, wanted);
+            S::under(clear, job.table.entries.as_ptr().cast(), &index, &fraction)
         };
-        for l in (0..LANES).filter(wanted) {
-            let Some(segment) = cut[l] else { continue };
-            counts.samples += 1;
-            counts.lattice += 1;
-            let share = (segment.length() / job.lattice.step) as f32;
-            let before = pixels.color[l][3];
-            let add = power(entries[l], share);
-            pixels.color[l] = under(pixels.color[l], add);
-            if before < job.threshold && pixels.color[l][3] >= job.threshold {
-                let part = part_of(before, add[3], job.threshold);
-                pixels.depth[l] = segment.start + segment.length() * f64::from(part);
-            }
+        S::store_quads(quads, &mut entries);
+    }
+    let inverse = 1.0 / job.lattice.step;
+    for l in 0..LANES {
+        if entries[l][3] <= 0.0 {
+            continue;
+        }
+        let [start, end] = cut[l];
+        let before = pixels.color[l][3];
+        let add = power(entries[l], ((end - start) * inverse) as f32);
+        pixels.color[l] = under(pixels.color[l], add);
+        if before < job.threshold && pixels.color[l][3] >= job.threshold {
+            let part = part_of(before, add[3], job.threshold);
+            pixels.depth[l] = start + (end - start) * f64::from(part);
         }
     }
 }
@@ -123,23 +138,58 @@ unsafe fn numbers<S: Simd, F: Fetch>(
     job: &Job<'_>,
     packet: &Packet,
     lead: usize,
-    t: impl Fn(usize) -> Option<f64>,
-) -> [f32; LANES] {
-    let base = Base::new(&job.voxels, packet.at(lead, t(lead).unwrap_or(0.0)));
+    t: impl Fn(usize) -> f64,
+) -> S::F {
+    let base = Base::new(&job.voxels, packet.at(lead, t(lead)));
     let mut p = [[0f32; LANES]; 3];
-    for l in 0..LANES {
-        let at = packet.at(l, t(l).unwrap_or(0.0));
-        for a in 0..3 {
-            p[a][l] = (at[a] - f64::from(base.at[a])) as f32;
+    for a in 0..3 {
+        let from = f64::from(base.at[a]);
+        for l in 0..LANES {
+            p[a][l] = (packet.origin[a][l] + packet.direction[a][l] * t(l) - from) as f32;
         }
     }
-    let mut out = [0f32; LANES];
+    // SAFETY: the caller's promises.
+    unsafe { F::fetch::<S>(&job.voxels, &base, [S::load(&p[0]), S::load(&p[1]), S::load(&p[2])]) }
+}
+
+/// Byte indices and fractions of numbers in the table; the transparent entry where not `live`.
+#[inline(always)]
+unsafe fn slots<S: Simd>(job: &Job<'_>, value: S::F, live: u32) -> ([i32; LANES], [f32; LANES]) {
+    let table = job.table;
+    let (mut index, mut fraction) = ([0i32; LANES], [0f32; LANES]);
     // SAFETY: the caller's promises.
     unsafe {
-        let p = [S::load(&p[0]), S::load(&p[1]), S::load(&p[2])];
-        S::store(F::fetch::<S>(&job.voxels, &base, p), &mut out);
+        let live = if job.voxels.scalar.is_float() { live & !S::nan_bits(value) } else { live };
+        let (node, f) = node::<S>(value, table.scale, table.offset, table.nodes);
+        let nothing = S::splat_int(16 * table.transparent() as i32);
+        S::store_int(S::select_int(live, S::shl::<4>(node), nothing), &mut index);
+        S::store(f, &mut fraction);
     }
-    out
+    (index, fraction)
+}
+
+/// The same for pairs.
+#[inline(always)]
+unsafe fn pair_slots<S: Simd>(
+    pairs: &SegmentPairs,
+    front: S::F,
+    back: S::F,
+    live: u32,
+) -> ([i32; LANES], [f32; LANES], [f32; LANES]) {
+    let (mut index, mut f_out, mut g_out) = ([0i32; LANES], [0f32; LANES], [0f32; LANES]);
+    // SAFETY: the caller's promises.
+    unsafe {
+        let live = live & !S::nan_bits(front) & !S::nan_bits(back);
+        let (i, f) = node::<S>(front, pairs.scale, pairs.offset, pairs.nodes);
+        let (j, g) = node::<S>(back, pairs.scale, pairs.offset, pairs.nodes);
+        let stride = pairs.stride() as i32;
+        let at = S::shl::<4>(S::add_int(S::mul_int(i, S::splat_int(stride)), j));
+        let nothing = S::splat_int(16 * (pairs.nodes as i32 + 1) * stride);
+        S::store_int(S::select_int(live, at, nothing), &mut index);
+        S::store(f, &mut f_out);
+        S::store(g, &mut g_out);
+    }
+    (index, f_out, g_out)
 }
 
 /// What a share of a segment adds, given what a whole one does: 1 − (1 − α)^share.
@@ -271,16 +321,9 @@ impl<S: Simd> Kernel<S> for SampleKernel<'_, S> {
 
     #[inline(always)]
     unsafe fn take(&mut self, value: S::F, live: u32, row: usize) {
-        let job = self.shared.job;
-        let table = job.table;
         // SAFETY: the caller's promises.
         unsafe {
-            let live = if job.voxels.scalar.is_float() { live & !S::nan_bits(value) } else { live };
-            let (node, fraction) = node::<S>(value, table.scale, table.offset, table.nodes);
-            let index = S::shl::<4>(node);
-            let index = S::select_int(live, index, S::splat_int(16 * table.transparent() as i32));
-            S::store_int(index, &mut self.index[self.rows]);
-            S::store(fraction, &mut self.fraction[self.rows]);
+            (self.index[self.rows], self.fraction[self.rows]) = slots::<S>(self.shared.job, value, live);
         }
         self.row_of[self.rows] = row as u8;
         self.rows += 1;
@@ -311,9 +354,9 @@ impl<S: Simd> Kernel<S> for SampleKernel<'_, S> {
     }
 
     #[inline(always)]
-    unsafe fn clear(&self, block: S::I) -> Option<S::F> {
+    unsafe fn clear(&self, block: [S::F; 3], index: S::I) -> (u32, [S::F; 3], [S::F; 3]) {
         // SAFETY: the caller's promises.
-        unsafe { distance::<S>(self.shared.job, block) }
+        unsafe { around::<S>(block, distance::<S>(self.shared.job, index)) }
     }
 }
 
@@ -329,11 +372,16 @@ unsafe fn node<S: Simd>(value: S::F, scale: f32, offset: f32, nodes: usize) -> (
     }
 }
 
+/// Distances of blocks to what can be seen.
 #[inline(always)]
-unsafe fn distance<S: Simd>(job: &Job<'_>, block: S::I) -> Option<S::F> {
-    let empty = job.empty?;
+unsafe fn distance<S: Simd>(job: &Job<'_>, index: S::I) -> S::F {
     // SAFETY: block indices are inside, and the map is padded by four bytes.
-    unsafe { Some(S::to_float(S::and_int(S::gather(empty.distance.as_ptr(), block), S::splat_int(255)))) }
+    unsafe {
+        match job.empty {
+            Some(empty) => S::to_float(S::and_int(S::gather(empty.distance.as_ptr(), index), S::splat_int(255))),
+            None => S::splat(0.0),
+        }
+    }
 }
 
 /// Pre-integrated classification by the numbers at both ends of each segment.
@@ -345,8 +393,7 @@ struct PairKernel<'a, S: Simd> {
     index: [[i32; LANES]; CHUNK],
     front: [[f32; LANES]; CHUNK],
     back: [[f32; LANES]; CHUNK],
-    last: (S::I, S::F),
-    last_nan: u32,
+    last: S::F,
 }
 
 impl<'a, S: Simd> PairKernel<'a, S> {
@@ -363,8 +410,7 @@ impl<'a, S: Simd> PairKernel<'a, S> {
                 index: [[0; LANES]; CHUNK],
                 front: zero,
                 back: zero,
-                last: (S::splat_int(0), S::splat(0.0)),
-                last_nan: 0,
+                last: S::splat(0.0),
             }
         }
     }
@@ -375,32 +421,17 @@ impl<S: Simd> Kernel<S> for PairKernel<'_, S> {
 
     #[inline(always)]
     unsafe fn start(&mut self, value: S::F) {
-        let pairs = self.pairs;
-        // SAFETY: the caller's promises.
-        unsafe {
-            self.last = node::<S>(value, pairs.scale, pairs.offset, pairs.nodes);
-            self.last_nan = S::nan_bits(value);
-        }
+        self.last = value;
     }
 
     #[inline(always)]
     unsafe fn take(&mut self, value: S::F, live: u32, row: usize) {
-        let pairs = self.pairs;
-        let stride = pairs.stride() as i32;
+        let r = self.rows;
         // SAFETY: the caller's promises.
         unsafe {
-            let nan = S::nan_bits(value);
-            let live = live & !nan & !self.last_nan;
-            let (i, f) = self.last;
-            let (j, g) = node::<S>(value, pairs.scale, pairs.offset, pairs.nodes);
-            let index = S::shl::<4>(S::add_int(S::mul_int(i, S::splat_int(stride)), j));
-            let nothing = 16 * (pairs.nodes as i32 + 1) * stride;
-            S::store_int(S::select_int(live, index, S::splat_int(nothing)), &mut self.index[self.rows]);
-            S::store(f, &mut self.front[self.rows]);
-            S::store(g, &mut self.back[self.rows]);
-            self.last = (j, g);
-            self.last_nan = nan;
+            (self.index[r], self.front[r], self.back[r]) = pair_slots::<S>(self.pairs, self.last, value, live);
         }
+        self.last = value;
         self.row_of[self.rows] = row as u8;
         self.rows += 1;
     }
@@ -434,8 +465,8 @@ impl<S: Simd> Kernel<S> for PairKernel<'_, S> {
     }
 
     #[inline(always)]
-    unsafe fn clear(&self, block: S::I) -> Option<S::F> {
+    unsafe fn clear(&self, block: [S::F; 3], index: S::I) -> (u32, [S::F; 3], [S::F; 3]) {
         // SAFETY: the caller's promises.
-        unsafe { distance::<S>(self.shared.job, block) }
+        unsafe { around::<S>(block, distance::<S>(self.shared.job, index)) }
     }
 }

@@ -2,8 +2,8 @@
 
 use volact_core::{
     Aabb, RayGrid,
-    glam::DAffine3,
-    lattice::{Lattice, Segment},
+    camera::LinearRays,
+    glam::{DAffine3, DVec3},
     resolve::ResolvedShape,
 };
 
@@ -31,90 +31,240 @@ impl Place {
     }
 }
 
+/// Sixteen f64.
+pub type Lanes = [f64; LANES];
+
+/// The rays of a picture in a shape's object space, ready to be made in packets.
+#[derive(Clone, Copy, Debug)]
+pub struct Rays {
+    world: LinearRays,
+    place: Place,
+}
+
+impl Rays {
+    /// The rays of a grid through a shape.
+    pub fn new(grid: &RayGrid, place: Place) -> Self {
+        Self { world: grid.linear(), place }
+    }
+}
+
 /// Sixteen rays in a shape's sample space.
 #[derive(Clone, Debug)]
 pub struct Packet {
     /// Sample coordinates at `t = 0`, by axis and lane.
-    pub origin: [[f64; LANES]; 3],
+    pub origin: [Lanes; 3],
     /// Sample coordinates a world unit, by axis and lane.
-    pub direction: [[f64; LANES]; 3],
-    /// The interval in `t`, by lane.
-    pub span: [[f64; 2]; LANES],
-    /// Distance that depth adds to `t`, by lane.
-    pub depth_zero: [f64; LANES],
+    pub direction: [Lanes; 3],
+    /// Beginnings of the intervals in `t`.
+    pub start: Lanes,
+    /// Ends of the intervals in `t`.
+    pub end: Lanes,
+    /// Distance that depth adds to `t`.
+    pub depth_zero: f64,
     /// Lanes with an interval of some length.
     pub active: u32,
 }
 
+#[inline(always)]
+fn each(f: impl Fn(usize) -> f64) -> Lanes {
+    let mut out = [0.0; LANES];
+    for (l, o) in out.iter_mut().enumerate() {
+        *o = f(l);
+    }
+    out
+}
+
 impl Packet {
-    /// The rays of pixels `x..x + 4`, `y..y + 4` inside a viewport of `size`.
-    pub fn new(grid: &RayGrid, place: &Place, [x, y]: [usize; 2], size: [usize; 2]) -> Self {
-        let zero = [0.0; LANES];
-        let mut packet =
-            Self { origin: [zero; 3], direction: [zero; 3], span: [[0.0; 2]; LANES], depth_zero: zero, active: 0 };
+    /// The rays of pixels `x..x + 4`, `y..y + 4` inside a viewport of `size`: what
+    /// [`RayGrid::ray`] gives, sixteen at once.
+    #[inline(always)]
+    pub fn new(rays: &Rays, [x, y]: [usize; 2], size: [usize; 2]) -> Self {
+        let w = &rays.world;
+        let px = each(|l| (x + l % SIDE) as f64 + 0.5);
+        let py = each(|l| (y + l / SIDE) as f64 + 0.5);
+        let plane = |a: usize| each(|l| w.corner[a] + w.dx[a] * px[l] + w.dy[a] * py[l]);
+        let plane = [plane(0), plane(1), plane(2)];
+        let (origin, direction) = match w.eye {
+            Some(eye) => {
+                let scale = each(|l| {
+                    1.0 / (plane[0][l] * plane[0][l] + plane[1][l] * plane[1][l] + plane[2][l] * plane[2][l]).sqrt()
+                });
+                let unit = |a: usize| each(|l| plane[a][l] * scale[l]);
+                ([[eye.x; LANES], [eye.y; LANES], [eye.z; LANES]], [unit(0), unit(1), unit(2)])
+            }
+            None => {
+                let d = w.direction;
+                let along = each(|l| plane[0][l] * d.x + plane[1][l] * d.y + plane[2][l] * d.z);
+                let point = |a: usize| each(|l| plane[a][l] - d[a] * along[l]);
+                ([point(0), point(1), point(2)], [[d.x; LANES], [d.y; LANES], [d.z; LANES]])
+            }
+        };
+        let mut packet = Self::through(rays, origin, direction);
         for l in 0..LANES {
-            let (px, py) = (x + l % SIDE, y + l / SIDE);
-            if px < size[0] && py < size[1] {
-                packet.set(l, grid, place, px as f64 + 0.5, py as f64 + 0.5);
+            if x + l % SIDE >= size[0] || y + l / SIDE >= size[1] {
+                packet.active &= !(1 << l);
             }
         }
         packet
     }
 
-    fn set(&mut self, l: usize, grid: &RayGrid, place: &Place, x: f64, y: f64) {
-        let ray = grid.ray(x, y);
-        let origin = place.to_object.transform_point3(ray.origin);
-        let direction = place.to_object.transform_vector3(ray.direction);
-        let Some([t0, t1]) = place.block.clip_line(origin, direction) else { return };
-        let (t0, t1) = (t0.max(ray.near), t1.min(ray.far));
-        if !(t0 < t1 && t0.is_finite() && t1.is_finite()) {
-            return;
+    #[inline(always)]
+    fn through(rays: &Rays, origin: [Lanes; 3], direction: [Lanes; 3]) -> Self {
+        let (w, place) = (&rays.world, &rays.place);
+        let slope = each(|l| w.axis.x * direction[0][l] + w.axis.y * direction[1][l] + w.axis.z * direction[2][l]);
+        let base = each(|l| w.axis.x * origin[0][l] + w.axis.y * origin[1][l] + w.axis.z * origin[2][l]);
+        let plane = |at: f64| each(|l| if at.is_finite() { (at - base[l]) / slope[l] } else { at });
+        let (mut start, mut end) = (plane(w.near), plane(w.far));
+        if w.eye.is_some() {
+            start = each(|l| if start[l] > 0.0 { start[l] } else { 0.0 });
         }
-        let (origin, direction) =
-            (place.to_index.transform_point3(origin), place.to_index.transform_vector3(direction));
+        let point = transform(&place.to_object, &origin, place.to_object.translation);
+        let vector = transform(&place.to_object, &direction, DVec3::ZERO);
+        let mut misses = [false; LANES];
         for a in 0..3 {
-            self.origin[a][l] = origin[a];
-            self.direction[a][l] = direction[a];
+            let (lo, hi) = (place.block.min[a], place.block.max[a]);
+            for l in 0..LANES {
+                let (o, d) = (point[a][l], vector[a][l]);
+                let (u, v) = ((lo - o) / d, (hi - o) / d);
+                let (near, far) = if u < v { (u, v) } else { (v, u) };
+                let across = d != 0.0;
+                start[l] = if across && near > start[l] { near } else { start[l] };
+                end[l] = if across && far < end[l] { far } else { end[l] };
+                misses[l] |= !across && (o < lo || o > hi);
+            }
         }
-        self.span[l] = [t0, t1];
-        self.depth_zero[l] = ray.depth_zero;
-        self.active |= 1 << l;
+        let mut active = 0;
+        for l in 0..LANES {
+            let inside = start[l] < end[l] && !misses[l] && (end[l] - start[l]).is_finite();
+            active |= u32::from(inside) << l;
+        }
+        Self {
+            origin: transform(&place.to_index, &point, place.to_index.translation),
+            direction: transform(&place.to_index, &vector, DVec3::ZERO),
+            start,
+            end,
+            depth_zero: w.depth_zero,
+            active,
+        }
     }
 
     /// Sample coordinates of a lane at `t`.
+    #[inline(always)]
     pub fn at(&self, l: usize, t: f64) -> [f64; 3] {
-        std::array::from_fn(|a| self.origin[a][l] + self.direction[a][l] * t)
+        [0, 1, 2].map(|a| self.origin[a][l] + self.direction[a][l] * t)
     }
 
-    /// Cuts all intervals by the lattice.
-    pub fn split(&self, lattice: &Lattice) -> Cuts {
-        let mut cuts = Cuts { first: [None; LANES], last: [None; LANES], from: [0; LANES], to: [0; LANES] };
-        for l in (0..LANES).filter(|l| self.active >> l & 1 == 1) {
-            let split = lattice.split(self.span[l][0], self.span[l][1]);
-            (cuts.first[l], cuts.last[l]) = (split.first, split.last);
-            [cuts.from[l], cuts.to[l]] = split.whole;
+    /// Cuts all intervals by the lattice of step `h`, as [`Lattice::split`] does.
+    ///
+    /// [`Lattice::split`]: volact_core::lattice::Lattice::split
+    #[inline(always)]
+    pub fn split(&self, h: f64) -> Cuts {
+        let first = each(|l| (self.start[l] / h).ceil());
+        let last = each(|l| (self.end[l] / h).floor());
+        let mut cuts = Cuts { front: [[0.0; 2]; LANES], back: [[0.0; 2]; LANES], from: [0.0; LANES], to: [0.0; LANES] };
+        for l in 0..LANES {
+            if self.active >> l & 1 == 0 {
+                continue;
+            }
+            let (t0, t1) = (self.start[l], self.end[l]);
+            if first[l] > last[l] {
+                cuts.front[l] = [t0, t1];
+                continue;
+            }
+            let (a, b) = (first[l] * h, last[l] * h);
+            (cuts.from[l], cuts.to[l]) = (first[l], last[l]);
+            if a > t0 {
+                cuts.front[l] = [t0, a];
+            }
+            if b < t1 {
+                cuts.back[l] = [b, t1];
+            }
         }
         cuts
     }
 }
 
+#[inline(always)]
+fn transform(by: &DAffine3, v: &[Lanes; 3], offset: DVec3) -> [Lanes; 3] {
+    let m = &by.matrix3;
+    let row = |a: usize| each(|l| m.x_axis[a] * v[0][l] + m.y_axis[a] * v[1][l] + m.z_axis[a] * v[2][l] + offset[a]);
+    [row(0), row(1), row(2)]
+}
+
 /// The intervals of a packet, cut by the lattice.
 #[derive(Clone, Debug)]
 pub struct Cuts {
-    /// Cut segments at the front.
-    pub first: [Option<Segment>; LANES],
-    /// Cut segments at the back.
-    pub last: [Option<Segment>; LANES],
+    /// Cut segments at the front; without length where there is none.
+    pub front: [[f64; 2]; LANES],
+    /// Cut segments at the back; without length where there is none.
+    pub back: [[f64; 2]; LANES],
     /// First whole segment.
-    pub from: [i64; LANES],
+    pub from: Lanes,
     /// One after the last whole segment.
-    pub to: [i64; LANES],
+    pub to: Lanes,
 }
 
 impl Cuts {
     /// Whole segments of all lanes together: the first, and one after the last.
+    #[inline(always)]
     pub fn whole(&self) -> Option<[i64; 2]> {
-        let lanes = || (0..LANES).filter(|&l| self.from[l] < self.to[l]);
-        Some([lanes().map(|l| self.from[l]).min()?, lanes().map(|l| self.to[l]).max()?])
+        let (mut first, mut last) = (f64::INFINITY, f64::NEG_INFINITY);
+        for l in 0..LANES {
+            if self.from[l] < self.to[l] {
+                first = first.min(self.from[l]);
+                last = last.max(self.to[l]);
+            }
+        }
+        (first < last).then_some([first as i64, last as i64])
+    }
+
+    /// Number of whole segments.
+    #[inline(always)]
+    pub fn count(&self) -> u64 {
+        let mut sum = 0.0;
+        for l in 0..LANES {
+            sum += self.to[l] - self.from[l];
+        }
+        sum as u64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use volact_core::{Camera, Viewport, lattice::Lattice};
+
+    #[test]
+    fn packets_are_the_rays_and_segments_of_core() {
+        let to_object = DAffine3::from_rotation_x(0.3) * DAffine3::from_translation(DVec3::new(0.1, 0.2, -0.3));
+        let to_index = DAffine3::from_scale(DVec3::new(3.0, 4.0, 5.0));
+        let place = Place { to_object, to_index, block: Aabb::new(-DVec3::ONE, DVec3::ONE) };
+        let viewport = Viewport { x: 0, y: 0, width: 9, height: 7 };
+        let (eye, up) = (DVec3::new(1.0, -4.0, 2.0), DVec3::Z);
+        for camera in
+            [Camera::perspective(eye, DVec3::ZERO, up, 35.0), Camera::orthographic(eye, DVec3::ZERO, up, 3.0)]
+        {
+            let grid = camera.rays(&viewport).unwrap();
+            for (x, y) in [(0, 0), (4, 0), (8, 4)] {
+                let packet = Packet::new(&Rays::new(&grid, place), [x, y], [9, 7]);
+                let cuts = packet.split(0.3);
+                for l in 0..LANES {
+                    let (px, py) = (x + l % SIDE, y + l / SIDE);
+                    let ray = grid.ray(px as f64 + 0.5, py as f64 + 0.5);
+                    let (o, d) = (to_object.transform_point3(ray.origin), to_object.transform_vector3(ray.direction));
+                    let span = place.block.clip_line(o, d).map(|[a, b]| [a.max(ray.near), b.min(ray.far)]);
+                    let inside = px < 9 && py < 7 && span.is_some_and(|[a, b]| a < b);
+                    assert_eq!(packet.active >> l & 1 == 1, inside, "{x} {y} {l}");
+                    let Some([a, b]) = span.filter(|_| inside) else { continue };
+                    assert!((packet.start[l] - a).abs() < 1e-12 && (packet.end[l] - b).abs() < 1e-12);
+                    let at = to_index.transform_point3(o + d * a);
+                    let got = packet.at(l, a);
+                    assert!((0..3).all(|i| (got[i] - at[i]).abs() < 1e-11));
+                    let split = Lattice { step: 0.3 }.split(packet.start[l], packet.end[l]);
+                    assert_eq!(split.whole.map(|k| k as f64), [cuts.from[l], cuts.to[l]]);
+                    assert_eq!(split.first.map(|s| [s.start, s.end]), Some(cuts.front[l]).filter(|c| c[0] < c[1]));
+                }
+            }
+        }
     }
 }

@@ -4,11 +4,11 @@
 use volact_core::{Compositing, lattice::Lattice};
 
 use super::{
-    bounds::{Emptiness, ValueBounds},
+    bounds::{COARSE, Emptiness, ValueBounds},
     fetch::{Base, Fetch, Voxels},
     packet::Packet,
     simd::{LANES, Simd},
-    walk::{CHUNK, Counts, Kernel, walk},
+    walk::{CHUNK, Counts, Kernel, around, walk},
 };
 
 /// One shape to reduce.
@@ -41,20 +41,21 @@ pub struct Reduced {
 /// Called from a function compiled for `S` on a machine that has it; `F` is the voxels' access.
 #[inline(always)]
 pub unsafe fn reduce<S: Simd, F: Fetch>(job: &Job<'_>, packet: &Packet, counts: &mut Counts) -> [Reduced; LANES] {
-    let cuts = packet.split(&job.lattice);
-    counts.rays += u64::from(packet.active.count_ones());
-    counts.lattice += (0..LANES).map(|l| (cuts.to[l] - cuts.from[l]).max(0) as u64).sum::<u64>();
     let step = job.lattice.step;
+    let cuts = packet.split(step);
+    counts.rays += u64::from(packet.active.count_ones());
+    counts.lattice += cuts.count();
     let mut out = [Reduced::default(); LANES];
     // The cut segments first: a maximum does not mind, a sum neither.
-    for cut in [&cuts.first, &cuts.last] {
+    for cut in [&cuts.front, &cuts.back] {
+        // SAFETY: the caller's promises.
+        let number = unsafe { numbers::<S, F>(job, packet, cut) };
         for l in 0..LANES {
-            if let Some(s) = cut[l] {
+            let [start, end] = cut[l];
+            if start < end {
                 counts.samples += 1;
                 counts.lattice += 1;
-                // SAFETY: the caller's promises.
-                let number = unsafe { number::<S, F>(job, packet, l, s.middle()) };
-                merge(&mut out[l], job.compositing, number, s.length());
+                merge(&mut out[l], job.compositing, number[l], end - start);
             }
         }
     }
@@ -64,15 +65,15 @@ pub unsafe fn reduce<S: Simd, F: Fetch>(job: &Job<'_>, packet: &Packet, counts: 
             Compositing::Maximum | Compositing::Minimum => {
                 let mut kernel = Extreme::<S>::new(job, &out);
                 let blocks = job.bounds.map(|b| b.blocks);
-                walk::<S, F, _>(&mut kernel, &job.voxels, packet, &cuts, step, blocks, 0, counts);
+                walk::<S, F, _>(&mut kernel, &job.voxels, packet, &cuts, step, blocks, counts);
                 kernel.finish(&mut out);
             }
             _ => {
                 let mut kernel = Sum::<S>::new(job);
                 let blocks = job.empty.map(|e| e.blocks);
-                walk::<S, F, _>(&mut kernel, &job.voxels, packet, &cuts, step, blocks, 0, counts);
+                walk::<S, F, _>(&mut kernel, &job.voxels, packet, &cuts, step, blocks, counts);
                 for l in 0..LANES {
-                    let whole = (cuts.to[l] - cuts.from[l]).max(0) as f64 - f64::from(kernel.missing[l]);
+                    let whole = cuts.to[l] - cuts.from[l] - f64::from(kernel.missing[l]);
                     out[l].value += kernel.total[l] * step;
                     out[l].length += whole * step;
                 }
@@ -98,18 +99,26 @@ fn merge(into: &mut Reduced, compositing: Compositing, number: f32, length: f64)
     into.length += length;
 }
 
+/// The numbers in the middle of cut segments.
 #[inline(always)]
-unsafe fn number<S: Simd, F: Fetch>(job: &Job<'_>, packet: &Packet, lane: usize, t: f64) -> f32 {
-    let at = packet.at(lane, t);
-    let base = Base::new(&job.voxels, at);
-    let local = |a: usize| (at[a] - f64::from(base.at[a])) as f32;
+unsafe fn numbers<S: Simd, F: Fetch>(job: &Job<'_>, packet: &Packet, cut: &[[f64; 2]; LANES]) -> [f32; LANES] {
+    let middle = |l: usize| 0.5 * (cut[l][0] + cut[l][1]);
+    let lead = (0..LANES).find(|&l| cut[l][0] < cut[l][1]).unwrap_or(0);
+    let base = Base::new(&job.voxels, packet.at(lead, middle(lead)));
+    let mut p = [[0f32; LANES]; 3];
+    for a in 0..3 {
+        let from = f64::from(base.at[a]);
+        for l in 0..LANES {
+            p[a][l] = (packet.origin[a][l] + packet.direction[a][l] * middle(l) - from) as f32;
+        }
+    }
     let mut out = [0f32; LANES];
     // SAFETY: the caller's promises.
     unsafe {
-        let p = [S::splat(local(0)), S::splat(local(1)), S::splat(local(2))];
+        let p = [S::load(&p[0]), S::load(&p[1]), S::load(&p[2])];
         S::store(F::fetch::<S>(&job.voxels, &base, p), &mut out);
     }
-    out[0]
+    out
 }
 
 /// Maximum; a minimum is the maximum of the negated numbers.
@@ -168,23 +177,46 @@ impl<S: Simd> Kernel<S> for Extreme<'_, S> {
     }
 
     #[inline(always)]
-    unsafe fn clear(&self, block: S::I) -> Option<S::F> {
-        let bounds = self.job.bounds?;
-        let [lo, hi] = bounds.range?;
-        // SAFETY: block indices are inside, and the list is padded by two bytes.
+    unsafe fn clear(&self, block: [S::F; 3], index: S::I) -> (u32, [S::F; 3], [S::F; 3]) {
+        // SAFETY: block indices are inside, and the lists are padded.
         unsafe {
-            let pair = S::gather(bounds.steps().as_ptr().cast(), S::shl::<1>(block));
-            let low = S::to_float(S::and_int(pair, S::splat_int(255)));
-            let high = S::to_float(S::and_int(S::shr::<8>(pair), S::splat_int(255)));
-            let step = (hi - lo) / 255.0;
-            // A block can be passed where even its bound, half a step wider, is not better.
+            let Some(bounds) = self.job.bounds else { return around::<S>(block, S::splat(0.0)) };
+            let share = 1.0 / COARSE as f32;
+            let coarse = [0, 1, 2].map(|a| S::floor(S::mul(block[a], S::splat(share))));
+            let [nx, ny, _] = bounds.coarse_blocks.map(|n| S::splat_int(n as i32));
+            let [x, y, z] = coarse.map(|c| S::to_int(c));
+            let coarse_index = S::add_int(x, S::mul_int(nx, S::add_int(y, S::mul_int(ny, z))));
+            let wide = self.worse(bounds, bounds.coarse(), coarse_index);
+            let own = wide | self.worse(bounds, bounds.steps(), index);
+            let (size, one) = (S::splat(COARSE as f32), S::splat(1.0));
+            let mut low = block;
+            let mut high = block;
+            for a in 0..3 {
+                low[a] = S::select(wide, S::mul(coarse[a], size), block[a]);
+                high[a] = S::add(low[a], S::select(wide, size, one));
+            }
+            (own, low, high)
+        }
+    }
+}
+
+impl<S: Simd> Extreme<'_, S> {
+    /// Lanes whose best number no value of their block passes, by bounds half a step wider.
+    #[inline(always)]
+    unsafe fn worse(&self, bounds: &ValueBounds, steps: &[[u8; 2]], index: S::I) -> u32 {
+        let [lo, hi] = bounds.range.unwrap_or([0.0, 0.0]);
+        let step = (hi - lo) / 255.0;
+        // SAFETY: indices are inside, and the lists are padded by two bytes.
+        unsafe {
+            let pair = S::gather(steps.as_ptr().cast(), S::shl::<1>(index));
             let bound = if self.sign > 0.0 {
+                let high = S::to_float(S::and_int(S::shr::<8>(pair), S::splat_int(255)));
                 S::add(S::mul(S::add(high, S::splat(0.5)), S::splat(step)), S::splat(lo))
             } else {
+                let low = S::to_float(S::and_int(pair, S::splat_int(255)));
                 S::sub(S::mul(S::sub(S::splat(0.5), low), S::splat(step)), S::splat(lo))
             };
-            let worse = S::lt_bits(bound, self.best);
-            Some(S::select(worse, S::splat(1.0), S::splat(0.0)))
+            S::lt_bits(bound, self.best)
         }
     }
 }
@@ -248,9 +280,14 @@ impl<S: Simd> Kernel<S> for Sum<'_, S> {
     }
 
     #[inline(always)]
-    unsafe fn clear(&self, block: S::I) -> Option<S::F> {
-        let empty = self.job.empty?;
+    unsafe fn clear(&self, block: [S::F; 3], index: S::I) -> (u32, [S::F; 3], [S::F; 3]) {
         // SAFETY: block indices are inside, and the map is padded by four bytes.
-        unsafe { Some(S::to_float(S::and_int(S::gather(empty.distance.as_ptr(), block), S::splat_int(255)))) }
+        unsafe {
+            let distance = match self.job.empty {
+                Some(empty) => S::to_float(S::and_int(S::gather(empty.distance.as_ptr(), index), S::splat_int(255))),
+                None => S::splat(0.0),
+            };
+            around::<S>(block, distance)
+        }
     }
 }

@@ -59,9 +59,25 @@ pub trait Kernel<S: Simd> {
     /// Ends the chunk that begins with segment `first`; returns the lanes that are done.
     unsafe fn end(&mut self, first: i64) -> u32;
 
-    /// How far around blocks nothing counts for each lane, in blocks (0: the block itself counts),
-    /// given the blocks' indices; `None` where nothing is ever skipped.
-    unsafe fn clear(&self, block: S::I) -> Option<S::F>;
+    /// Where nothing counts around each lane: the lanes whose own block can be skipped, and the
+    /// region around it, in blocks from `low` up to `high`. `block` are the blocks' coordinates,
+    /// `index` their indices.
+    unsafe fn clear(&self, block: [S::F; 3], index: S::I) -> (u32, [S::F; 3], [S::F; 3]);
+}
+
+/// The region of a distance in blocks around a block.
+///
+/// # Safety
+/// The contract of [`Simd`].
+#[inline(always)]
+pub unsafe fn around<S: Simd>(block: [S::F; 3], distance: S::F) -> (u32, [S::F; 3], [S::F; 3]) {
+    // SAFETY: the caller's promises.
+    unsafe {
+        let back = S::sub(S::splat(1.0), distance);
+        let low = [S::add(block[0], back), S::add(block[1], back), S::add(block[2], back)];
+        let high = [S::add(block[0], distance), S::add(block[1], distance), S::add(block[2], distance)];
+        (S::lt_bits(S::splat(0.0), distance), low, high)
+    }
 }
 
 /// Blocks along each axis, for a walk that skips.
@@ -79,22 +95,22 @@ pub unsafe fn walk<S: Simd, F: Fetch, K: Kernel<S>>(
     cuts: &Cuts,
     step: f64,
     blocks: Blocks,
-    mut done: u32,
     counts: &mut Counts,
 ) {
     let Some([first, last]) = cuts.whole() else { return };
-    let mut k = first;
-    while k < last {
-        let chunk = k.div_euclid(CHUNK as i64) * CHUNK as i64;
-        // SAFETY: the caller's promises.
-        unsafe {
-            let rows = Rows::<S>::new::<K>(voxels, packet, cuts, step, chunk, done);
-            if rows.finished == ALL {
+    // SAFETY: the caller's promises.
+    unsafe {
+        let mut rows = Rows::<S>::new(voxels, packet, cuts, step, first);
+        let mut k = first;
+        while k < last {
+            let chunk = k.div_euclid(CHUNK as i64) * CHUNK as i64;
+            rows.begin::<K>(voxels, packet, step, chunk, chunk - first);
+            if rows.finished() == ALL {
                 return;
             }
             let end = (last - chunk).min(CHUNK as i64) as usize;
             k = chunk + rows.visit::<F, K>(kernel, voxels, (k - chunk) as usize, end, blocks, counts) as i64;
-            done |= kernel.end(chunk);
+            rows.done |= kernel.end(chunk);
         }
     }
 }
@@ -106,66 +122,94 @@ struct Rows<S: Simd> {
     advance: [S::F; 3],
     /// Rows a sample coordinate.
     inverse: [S::F; 3],
+    /// Whole segments of each lane, counted from the packet's first.
+    whole: [S::F; 2],
+    /// The same, counted from the chunk's first.
     from: S::F,
     to: S::F,
+    /// Segments in which every lane is live, counted from the packet's first.
+    all_live: [i64; 2],
     /// Rows in which every lane is live.
-    full: [usize; 2],
-    /// Lanes that have nothing more to take.
-    finished: u32,
+    full: [i64; 2],
+    lead: usize,
     done: u32,
 }
 
 impl<S: Simd> Rows<S> {
     #[inline(always)]
-    unsafe fn new<K: Kernel<S>>(
-        voxels: &Voxels<'_>,
-        packet: &Packet,
-        cuts: &Cuts,
-        step: f64,
-        chunk: i64,
-        done: u32,
-    ) -> Self {
-        let t = (chunk as f64 + K::AT) * step;
-        let lead = (0..LANES).find(|l| packet.active >> l & 1 == 1).unwrap_or(0);
-        let base = Base::new(voxels, packet.at(lead, t + 0.5 * CHUNK as f64 * step));
-        let mut position = [[0f32; LANES]; 3];
+    unsafe fn new(voxels: &Voxels<'_>, packet: &Packet, cuts: &Cuts, step: f64, first: i64) -> Self {
         let mut advance = [[0f32; LANES]; 3];
         let mut inverse = [[0f32; LANES]; 3];
         for a in 0..3 {
             for l in 0..LANES {
-                let at = packet.origin[a][l] + packet.direction[a][l] * t;
-                position[a][l] = (at - f64::from(base.at[a])) as f32;
-                advance[a][l] = (packet.direction[a][l] * step) as f32;
-                inverse[a][l] = (1.0 / advance[a][l]).clamp(-1e30, 1e30);
+                let d = (packet.direction[a][l] * step) as f32;
+                let i = 1.0 / d;
+                advance[a][l] = d;
+                inverse[a][l] = if i > 1e30 { 1e30 } else if i < -1e30 { -1e30 } else { i };
             }
         }
         let mut from = [0f32; LANES];
         let mut to = [0f32; LANES];
-        let mut full = [0usize, CHUNK];
-        let mut finished = done;
+        let mut all_live = [f32::NEG_INFINITY, f32::INFINITY];
         for l in 0..LANES {
-            let (a, b) = (cuts.from[l] - chunk, cuts.to[l] - chunk);
-            let (a, b) = (a.clamp(0, CHUNK as i64), if a < b { b.clamp(0, CHUNK as i64) } else { 0 });
-            (from[l], to[l]) = (a as f32, b as f32);
-            full = [full[0].max(a as usize), full[1].min(b as usize)];
-            if cuts.to[l] <= chunk || cuts.from[l] >= cuts.to[l] {
-                finished |= 1 << l;
+            let some = cuts.from[l] < cuts.to[l];
+            from[l] = if some { (cuts.from[l] - first as f64) as f32 } else { 0.0 };
+            to[l] = if some { (cuts.to[l] - first as f64) as f32 } else { 0.0 };
+            all_live = [all_live[0].max(from[l]), all_live[1].min(to[l])];
+        }
+        let lead = (packet.active.trailing_zeros() as usize).min(LANES - 1);
+        // SAFETY: the caller's promises.
+        unsafe {
+            let zero = S::splat(0.0);
+            Self {
+                base: Base::new(voxels, [0.0; 3]),
+                position: [zero; 3],
+                advance: [S::load(&advance[0]), S::load(&advance[1]), S::load(&advance[2])],
+                inverse: [S::load(&inverse[0]), S::load(&inverse[1]), S::load(&inverse[2])],
+                whole: [S::load(&from), S::load(&to)],
+                from: zero,
+                to: zero,
+                all_live: all_live.map(|v| v as i64),
+                full: [0, 0],
+                lead,
+                done: 0,
+            }
+        }
+    }
+
+    /// Moves to the chunk that begins with segment `chunk`, `ahead` after the packet's first.
+    #[inline(always)]
+    unsafe fn begin<K: Kernel<S>>(
+        &mut self,
+        voxels: &Voxels<'_>,
+        packet: &Packet,
+        step: f64,
+        chunk: i64,
+        ahead: i64,
+    ) {
+        let t = (chunk as f64 + K::AT) * step;
+        self.base = Base::new(voxels, packet.at(self.lead, t + 0.5 * CHUNK as f64 * step));
+        let mut position = [[0f32; LANES]; 3];
+        for a in 0..3 {
+            let base = f64::from(self.base.at[a]);
+            for l in 0..LANES {
+                position[a][l] = (packet.origin[a][l] + packet.direction[a][l] * t - base) as f32;
             }
         }
         // SAFETY: the caller's promises.
         unsafe {
-            Self {
-                base,
-                position: [S::load(&position[0]), S::load(&position[1]), S::load(&position[2])],
-                advance: [S::load(&advance[0]), S::load(&advance[1]), S::load(&advance[2])],
-                inverse: [S::load(&inverse[0]), S::load(&inverse[1]), S::load(&inverse[2])],
-                from: S::load(&from),
-                to: S::load(&to),
-                full: if done == 0 { full } else { [CHUNK, 0] },
-                finished,
-                done,
-            }
+            self.position = [S::load(&position[0]), S::load(&position[1]), S::load(&position[2])];
+            let ahead = S::splat(ahead as f32);
+            (self.from, self.to) = (S::sub(self.whole[0], ahead), S::sub(self.whole[1], ahead));
         }
+        self.full = if self.done == 0 { self.all_live.map(|v| v - ahead) } else { [0, 0] };
+    }
+
+    /// Lanes that have nothing more to take.
+    #[inline(always)]
+    unsafe fn finished(&self) -> u32 {
+        // SAFETY: the caller's promises.
+        unsafe { self.done | !S::lt_bits(S::splat(0.0), self.to) & ALL }
     }
 
     #[inline(always)]
@@ -223,7 +267,7 @@ impl<S: Simd> Rows<S> {
 
     #[inline(always)]
     unsafe fn live(&self, row: usize) -> u32 {
-        if row >= self.full[0] && row < self.full[1] {
+        if row as i64 >= self.full[0] && (row as i64) < self.full[1] {
             return ALL;
         }
         // SAFETY: the caller's promises.
@@ -256,17 +300,17 @@ impl<S: Simd> Rows<S> {
                     S::add_int(y, S::mul_int(S::splat_int(blocks[1] as i32), z)),
                 ),
             );
-            let Some(clear) = kernel.clear(index) else { return 0 };
+            let (clear, low, high) = kernel.clear(block, index);
             let size = S::splat(BLOCK as f32);
             let mut rows = S::splat(f32::INFINITY);
             for a in 0..3 {
-                let low = S::mul(S::sub(S::add(block[a], S::splat(1.0)), clear), size);
-                let high = S::mul(S::add(block[a], clear), size);
-                let below = S::mul(S::sub(S::add(low, S::splat(MARGIN)), q[a]), self.inverse[a]);
-                let above = S::mul(S::sub(S::sub(high, S::splat(MARGIN)), q[a]), self.inverse[a]);
+                let low = S::add(S::mul(low[a], size), S::splat(MARGIN));
+                let high = S::sub(S::mul(high[a], size), S::splat(MARGIN));
+                let below = S::mul(S::sub(low, q[a]), self.inverse[a]);
+                let above = S::mul(S::sub(high, q[a]), self.inverse[a]);
                 rows = S::min(rows, S::max(below, above));
             }
-            let rows = S::where_zero(clear, S::splat(-1.0), rows);
+            let rows = S::select(clear, rows, S::splat(-1.0));
             let ends = if K::AT == 0.0 { 0.0 } else { 1.0 };
             let rows = S::add(S::floor(rows), S::splat(ends));
             // Lanes that are done or past their end never wait; those before it wait that long.
