@@ -13,6 +13,8 @@ pub(super) struct Segment {
     pub base: f64,
     /// Red, green, blue, opacity at `base`.
     pub at_base: [f64; 4],
+    /// The same at `hi`, to the bit that of the control point.
+    pub at_end: [f64; 4],
     /// Their change for one unit of value.
     pub slope: [f64; 4],
 }
@@ -46,7 +48,14 @@ impl Knots {
     /// From control points in rising order, at least one; clamped outside.
     pub fn new(points: Vec<ControlPoint>) -> Self {
         let mut segments = Vec::with_capacity(points.len() + 1);
-        let flat = |lo, hi, p: &ControlPoint| Segment { lo, hi, base: p.value, at_base: rgba(p), slope: [0.0; 4] };
+        let flat = |lo, hi, p: &ControlPoint| Segment {
+            lo,
+            hi,
+            base: p.value,
+            at_base: rgba(p),
+            at_end: rgba(p),
+            slope: [0.0; 4],
+        };
         if let (Some(first), Some(last)) = (points.first(), points.last()) {
             segments.push(flat(f64::NEG_INFINITY, first.value, first));
             segments.extend(points.windows(2).map(|w| between(&w[0], &w[1])));
@@ -59,7 +68,8 @@ impl Knots {
     pub fn identity(channel: usize) -> Self {
         let mut slope = [0.0; 4];
         slope[channel] = 1.0;
-        let all = Segment { lo: f64::NEG_INFINITY, hi: f64::INFINITY, base: 0.0, at_base: [0.0; 4], slope };
+        let all =
+            Segment { lo: f64::NEG_INFINITY, hi: f64::INFINITY, base: 0.0, at_base: [0.0; 4], at_end: [0.0; 4], slope };
         Self { points: Vec::new(), segments: vec![all] }
     }
 
@@ -117,7 +127,7 @@ fn between(a: &ControlPoint, b: &ControlPoint) -> Segment {
     let (ya, yb) = (rgba(a), rgba(b));
     let width = b.value - a.value;
     let slope = [0, 1, 2, 3].map(|c| if width > 0.0 { (yb[c] - ya[c]) / width } else { 0.0 });
-    Segment { lo: a.value, hi: b.value, base: a.value, at_base: ya, slope }
+    Segment { lo: a.value, hi: b.value, base: a.value, at_base: ya, at_end: yb, slope }
 }
 
 #[cfg(test)]

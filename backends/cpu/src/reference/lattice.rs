@@ -17,7 +17,6 @@ use super::{
     cubic,
     flat::Gather,
     line::Line,
-    march::Light,
     medium::{Medium, Voxels},
     piece::{Cutter, Piece},
 };
@@ -90,65 +89,22 @@ fn classify(medium: &Medium, values: &[f64; 4]) -> [f64; 4] {
     rgba
 }
 
-/// One shape's part of a segment.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Slab {
-    k: i64,
-    /// Where it begins and ends, in the sweep's `t`.
-    t: [f64; 2],
-    /// Optical depth, may be infinite.
-    depth: f64,
-    color: [f64; 3],
-}
-
-/// Adds the segments of one shape, with `shift` from the line's `t` to the sweep's.
-pub(super) fn slabs(
+/// Visits the segments of a line as pieces of constant opacity and colour: what the value in the
+/// middle says. Where shapes overlap, such pieces are cut where any of them begins or ends.
+pub(super) fn post(
     medium: &Medium,
     voxels: &Voxels<'_>,
     line: &Line,
     counting: &Counting,
-    shift: f64,
-    slabs: &mut Vec<Slab>,
+    mut visit: impl FnMut(&Piece) -> bool,
 ) {
     for s in counting.segments(line) {
         let Some(values) = sample(medium, voxels, line.point(s.middle())) else { continue };
-        let [r, g, b, a] = classify(medium, &values);
-        if a > 0.0 && s.length() > 0.0 {
-            let depth = if a == 1.0 { f64::INFINITY } else { -(-a).ln_1p() * s.length() / medium.unit };
-            slabs.push(Slab { k: s.k, t: [s.start + shift, s.end + shift], depth, color: [r, g, b] });
+        let rgba = classify(medium, &values);
+        if s.length() > 0.0 && !visit(&Piece::constant([s.start, s.end], rgba, medium.unit)) {
+            return;
         }
     }
-}
-
-/// Composites slabs: those of one segment are one, extinctions added.
-pub(super) fn composite(slabs: &mut [Slab], depth_threshold: f64) -> Light {
-    slabs.sort_by_key(|s| s.k);
-    let mut light = Light::NONE;
-    let (mut color, mut left) = ([0.0; 3], 1.0);
-    for group in slabs.chunk_by(|a, b| a.k == b.k) {
-        let depth: f64 = group.iter().map(|s| s.depth).sum();
-        let opaque = group.iter().filter(|s| s.depth.is_infinite()).count() as f64;
-        let weight = |s: &Slab| match opaque > 0.0 {
-            true => f64::from(u8::from(s.depth.is_infinite())) / opaque,
-            false => s.depth / depth,
-        };
-        let absorbed = left * -(-depth).exp_m1();
-        for s in group {
-            for (sum, c) in color.iter_mut().zip(s.color) {
-                *sum += absorbed * weight(s) * c;
-            }
-        }
-        let wanted = (left / (1.0 - depth_threshold)).ln();
-        if light.depth.is_infinite() && depth >= wanted {
-            let start = group.iter().map(|s| s.t[0]).fold(f64::INFINITY, f64::min);
-            let end = group.iter().map(|s| s.t[1]).fold(f64::NEG_INFINITY, f64::max);
-            light.depth = start + if depth.is_finite() { (end - start) * wanted / depth } else { 0.0 };
-        }
-        left *= (-depth).exp();
-    }
-    light.lower = [color[0], color[1], color[2], 1.0 - left];
-    light.upper = light.lower;
-    light
 }
 
 /// Visits the pieces of a pre-integrated line in order.

@@ -223,12 +223,13 @@ impl March {
         self.terms.clear();
         let mut color_error = 0f64;
         for p in pieces.iter().filter(|p| p.kind == Kind::Smooth) {
-            let opacity = cubic::restrict(&p.opacity, middle, half);
+            let (opacity, rest) = (cubic::eval(&p.opacity, middle), cubic::restrict(&p.rest, middle, half));
             let color = p.color.each_ref().map(|c| cubic::restrict(c, middle, half));
-            let round = 16.0 * EPS * p.opacity.iter().map(|v| v.abs()).sum::<f64>();
-            let opacity_error = p.opacity_error + if variation(&p.opacity) == 0.0 { 0.0 } else { round };
+            // A polynomial's roundings go with its coefficients, whatever its value.
+            let round = 16.0 * EPS * p.rest.iter().map(|v| v.abs()).sum::<f64>();
+            let opacity_error = p.opacity_error + if variation(&p.rest) == 0.0 { 0.0 } else { round };
             color_error = color_error.max(p.color_error);
-            let Some(term) = Term::new(&opacity, opacity_error, color, length * half / p.unit) else {
+            let Some(term) = Term::new(opacity, &rest, opacity_error, color, length * half / p.unit) else {
                 return self.last_bit(pieces, [a, b]);
             };
             self.terms.push(term);
@@ -292,16 +293,18 @@ impl March {
         let (mut worst, mut chosen) = (-1.0, pieces[0]);
         let mut hopeless = true;
         for p in pieces.iter().filter(|p| p.kind == Kind::Smooth) {
-            let rest = |y: f64| 1.0 - cubic::eval(&p.opacity, y);
-            let most = rest(-1.0).max(rest(0.0)).max(rest(1.0)) - p.opacity_error - 16.0 * EPS;
-            let own = 0.5 * (p.t[1] - p.t[0]) / p.unit * log_bound(width, most * p.ratio);
+            let rest = |y: f64| cubic::eval(&p.rest, y);
+            let wrong = p.opacity_error + 16.0 * EPS * p.rest.iter().map(|v| v.abs()).sum::<f64>();
+            let most = rest(-1.0).max(rest(0.0)).max(rest(1.0)) - wrong;
+            let bound = log_bound(width, most * p.ratio) - width * p.floor.ln();
+            let own = 0.5 * (p.t[1] - p.t[0]) / p.unit * bound;
             depth += own;
             others += if own > worst { worst.max(0.0) } else { own };
             if own > worst {
                 (worst, chosen) = (own, *p);
             }
             let here = rest(a).max(rest(b)).max(rest(0.5 * (a + b)));
-            hopeless &= here <= 32.0 * (p.opacity_error + 16.0 * EPS);
+            hopeless &= here <= 32.0 * wrong;
         }
         if depth > REST && width > 1e-14 && !hopeless {
             return false;

@@ -51,12 +51,12 @@ fn part(p: &Piece, t: [f64; 2], snap: f64) -> Piece {
     // How far y may be wrong, and with it what depends on it.
     let loose = 4.0 * snap / length + 16.0 * EPS;
     let moved = |c: &[f64; 4]| loose * (c[1].abs() + 2.0 * c[2].abs() + 3.0 * c[3].abs());
-    let mut made = Piece { t, opacity: restrict(&p.opacity), ..*p };
+    let mut made = Piece { t, opacity: restrict(&p.opacity), rest: restrict(&p.rest), ..*p };
     made.color = p.color.each_ref().map(restrict);
     made.color_error += p.color.iter().map(moved).fold(0.0, f64::max);
-    made.opacity_error += moved(&p.opacity);
+    made.opacity_error += moved(&p.rest);
     if p.kind == Kind::Smooth {
-        let least = [-1.0, 0.0, 1.0].map(|y| 1.0 - cubic::eval(&made.opacity, y)).into_iter().fold(1.0, f64::min);
+        let least = [-1.0, 0.0, 1.0].map(|y| cubic::eval(&made.rest, y)).into_iter().fold(1.0, f64::min);
         let zone = (2.0 * snap / (t[1] - t[0])).min(2.0);
         let log = if least > 1e-12 { -least.ln() + 0.7 } else { 3.0 * (8.0 / zone).ln() + 40.0 };
         made.edge = p.edge / half.max(1e-300) + zone * log;

@@ -20,7 +20,7 @@ use super::{
     medium::{Medium, Voxels},
     options::{Classification, Method, NAME, ReferenceOptions},
     overlap::{self, Track},
-    piece::Cutter,
+    piece::{Cutter, Piece},
 };
 
 /// A picture with an enclosure for each pixel: premultiplied RGBA, row by row from the top.
@@ -234,24 +234,12 @@ impl Scene<'_> {
     fn over(&self, ray: &Ray, shapes: &[&(&Prepared, Line)], cutter: &mut Cutter) -> (Light, u64) {
         let counting = self.counting(ray);
         let zero = shapes[0].1.anchor;
-        if let Some(counting) = counting
-            && self.options.classification == Classification::Post
-        {
-            let mut slabs = Vec::new();
-            for (shape, line) in shapes {
-                let voxels = Voxels::new(&shape.medium.texture);
-                lattice::slabs(&shape.medium, &voxels, line, &counting, line.anchor - zero, &mut slabs);
-            }
-            let mut light = lattice::composite(&mut slabs, self.threshold);
-            light.depth += zero;
-            return (light, slabs.len() as u64);
-        }
         let brightest = shapes.iter().map(|(s, _)| s.medium.brightest()).fold(1.0, f64::max);
         let mut march = March::new(self.threshold, brightest);
         if let [(shape, line)] = shapes {
-            pieces(shape, line, counting.as_ref(), cutter, |piece| march.advance(std::slice::from_ref(piece)));
+            self.pieces(shape, line, counting.as_ref(), cutter, |piece| march.advance(std::slice::from_ref(piece)));
         } else {
-            let (tracks, snap) = tracks(shapes, zero, counting.as_ref(), cutter);
+            let (tracks, snap) = self.tracks(shapes, zero, counting.as_ref(), cutter);
             overlap::sweep(&tracks, snap, |pieces| march.advance(pieces));
         }
         let samples = march.stretches;
@@ -259,44 +247,49 @@ impl Scene<'_> {
         light.depth += zero;
         (light, samples)
     }
-}
 
-/// Visits a shape's pieces along a line.
-fn pieces(
-    shape: &Prepared,
-    line: &Line,
-    counting: Option<&Counting>,
-    cutter: &mut Cutter,
-    mut visit: impl FnMut(&super::piece::Piece) -> bool,
-) {
-    let voxels = Voxels::new(&shape.medium.texture);
-    match counting {
-        None => shape.grid.walk(line, |cell| cutter.cut(&shape.medium, &voxels, line, cell, &mut visit)),
-        Some(counting) => lattice::pre_integrated(&shape.medium, &voxels, line, counting, cutter, visit),
+    /// Visits a shape's pieces along a line.
+    fn pieces(
+        &self,
+        shape: &Prepared,
+        line: &Line,
+        counting: Option<&Counting>,
+        cutter: &mut Cutter,
+        mut visit: impl FnMut(&Piece) -> bool,
+    ) {
+        let voxels = Voxels::new(&shape.medium.texture);
+        match counting {
+            None => shape.grid.walk(line, |cell| cutter.cut(&shape.medium, &voxels, line, cell, &mut visit)),
+            Some(counting) if self.options.classification == Classification::Post => {
+                lattice::post(&shape.medium, &voxels, line, counting, visit);
+            }
+            Some(counting) => lattice::pre_integrated(&shape.medium, &voxels, line, counting, cutter, visit),
+        }
     }
-}
 
-/// All shapes' pieces, counted from one zero, and the distance within which ends are one.
-fn tracks(
-    shapes: &[&(&Prepared, Line)],
-    zero: f64,
-    counting: Option<&Counting>,
-    cutter: &mut Cutter,
-) -> (Vec<Track>, f64) {
-    let mut snap = 0f64;
-    let mut tracks = Vec::with_capacity(shapes.len());
-    for (shape, line) in shapes {
-        let shift = line.anchor - zero;
-        snap = snap.max(2.0 * line.dt + 8.0 * EPS * (line.anchor.abs() + zero.abs() + shift.abs()));
-        let mut track = Track::new();
-        pieces(shape, line, counting, cutter, |piece| {
-            let entry = (piece.t[0] == line.t[0]).then_some(shape.place_number);
-            track.push(super::piece::Piece { t: piece.t.map(|t| t + shift), entry, ..*piece });
-            true
-        });
-        tracks.push(track);
+    /// All shapes' pieces, counted from one zero, and the distance within which ends are one.
+    fn tracks(
+        &self,
+        shapes: &[&(&Prepared, Line)],
+        zero: f64,
+        counting: Option<&Counting>,
+        cutter: &mut Cutter,
+    ) -> (Vec<Track>, f64) {
+        let mut snap = 0f64;
+        let mut tracks = Vec::with_capacity(shapes.len());
+        for (shape, line) in shapes {
+            let shift = line.anchor - zero;
+            snap = snap.max(2.0 * line.dt + 8.0 * EPS * (line.anchor.abs() + zero.abs() + shift.abs()));
+            let mut track = Track::new();
+            self.pieces(shape, line, counting, cutter, |piece| {
+                let entry = (piece.t[0] == line.t[0]).then_some(shape.place_number);
+                track.push(Piece { t: piece.t.map(|t| t + shift), entry, ..*piece });
+                true
+            });
+            tracks.push(track);
+        }
+        (tracks, snap)
     }
-    (tracks, snap)
 }
 
 fn gather(

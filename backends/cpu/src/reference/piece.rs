@@ -43,8 +43,10 @@ pub(super) struct Piece {
     pub t: [f64; 2],
     pub kind: Kind,
     pub opacity: Cubic,
+    /// 1 − opacity, without cancellation next to 1.
+    pub rest: Cubic,
     pub color: [Cubic; 3],
-    /// Bound on the error of `opacity`.
+    /// Bound on the error of `opacity` and `rest` beyond a few roundings of themselves.
     pub opacity_error: f64,
     /// Bound on the error of any `color`.
     pub color_error: f64,
@@ -54,12 +56,42 @@ pub(super) struct Piece {
     pub edge_color: f64,
     /// How much flatter 1 − a may rise from a zero than this piece says.
     pub ratio: f64,
+    /// What 1 − a may be where the next segment is flat; 1 where none is near.
+    pub floor: f64,
     /// Whether an opaque stretch that is not seen here may follow.
     pub doubt: bool,
     /// World length over which opacity is the fraction absorbed.
     pub unit: f64,
     /// Which place's face it begins at, if it is one; for shapes that share a place.
     pub entry: Option<usize>,
+}
+
+impl Piece {
+    /// A piece of constant colour and opacity, without error.
+    pub fn constant(t: [f64; 2], [r, g, b, a]: [f64; 4], unit: f64) -> Self {
+        let flat = |v: f64| [v, 0.0, 0.0, 0.0];
+        let kind = match a {
+            0.0 => Kind::Transparent,
+            1.0 => Kind::Opaque { certain: true },
+            _ => Kind::Smooth,
+        };
+        Self {
+            t,
+            kind,
+            opacity: flat(a),
+            rest: flat(1.0 - a),
+            color: [flat(r), flat(g), flat(b)],
+            opacity_error: 0.0,
+            color_error: 0.0,
+            edge: 0.0,
+            edge_color: 0.0,
+            ratio: 1.0,
+            floor: 1.0,
+            doubt: false,
+            unit,
+            entry: None,
+        }
+    }
 }
 
 /// Remez: on a set of measure `w` of an interval of measure 2, −ln |p| of a cubic p with maximum
@@ -200,20 +232,7 @@ fn local<'a>(field: &'a Field, corner: &[f64; 8], line: &Line, cell: &Cell) -> L
 fn piece(medium: &Medium, locals: &[Option<Local<'_>>], line: &Line, cell: &Cell, s: [f64; 2]) -> Piece {
     let span = cell.t[1] - cell.t[0];
     let at = |s: f64| if s == 1.0 { cell.t[1] } else { cell.t[0] + span * s };
-    let mut made = Piece {
-        t: [at(s[0]), at(s[1])],
-        kind: Kind::Opaque { certain: true },
-        opacity: [1.0, 0.0, 0.0, 0.0],
-        color: [[0.0; 4]; 3],
-        opacity_error: 0.0,
-        color_error: 0.0,
-        edge: 0.0,
-        edge_color: 0.0,
-        ratio: 1.0,
-        doubt: false,
-        unit: medium.unit,
-        entry: None,
-    };
+    let mut made = Piece::constant([at(s[0]), at(s[1])], [0.0, 0.0, 0.0, 1.0], medium.unit);
     for local in locals.iter().flatten() {
         classify(&mut made, local, s);
     }
@@ -247,7 +266,8 @@ fn classify(made: &mut Piece, local: &Local<'_>, s: [f64; 2]) {
             made.color_error = made.color_error.max(wrong);
         } else {
             made.opacity = channel;
-            made.opacity_error = wrong;
+            made.rest = rest(segment, local.origin, &value);
+            made.opacity_error = k.abs() * error;
             made.kind = if segment.is_transparent() {
                 Kind::Transparent
             } else if segment.is_opaque() {
@@ -263,6 +283,17 @@ fn classify(made: &mut Piece, local: &Local<'_>, s: [f64; 2]) {
             look_across(made, local, number, upward, &value, [lo, hi], error);
         }
     }
+}
+
+/// 1 − opacity along a value, counted from the end of the segment where it is smaller.
+fn rest(segment: &Segment, origin: f64, value: &Cubic) -> Cubic {
+    let k = segment.slope[3];
+    let constant = match (k == 0.0, segment.at_end[3] > segment.at_base[3]) {
+        (true, _) => 1.0 - segment.at_base[3],
+        (false, true) => (1.0 - segment.at_end[3]) + k * ((segment.hi - origin) - value[0]),
+        (false, false) => (1.0 - segment.at_base[3]) - k * ((origin - segment.base) + value[0]),
+    };
+    [constant, -k * value[1], -k * value[2], -k * value[3]]
 }
 
 /// How far inside its segment the value gets, counted from the ends that data can pass.
@@ -296,24 +327,28 @@ fn look_across(
     let far = (lo - knot).abs().max((hi - knot).abs());
     let zone = zone(value, if upward == (value[1] >= 0.0) { 1.0 } else { -1.0 }, far, error);
     made.doubt |= next.hi - next.lo < 4.0 * error;
-    let opacity = if local.field.drives[3] { Some([segment.at(3, knot), next.at(3, knot)]) } else { None };
+    let (here, there) = if upward { (segment.at_end, next.at_base) } else { (segment.at_base, next.at_end) };
+    let opacity = local.field.drives[3].then_some([here[3], there[3]]);
     if let Some([own, other]) = opacity {
         made.doubt |= next.is_opaque() && !segment.is_opaque();
         let slope = next.slope[3].abs();
         let step = (own - other).abs();
-        if step <= 1e-14 && slope * error <= 1e-12 {
-            made.opacity_error = made.opacity_error.max(slope * error + step);
+        let alike = slope <= 4.0 * segment.slope[3].abs() || slope * error <= 1e-13 * (1.0 - own);
+        if step == 0.0 && alike {
+            made.opacity_error = made.opacity_error.max(slope * error);
         } else if !segment.is_opaque() && !next.is_opaque() {
             made.edge += edge([own, other], [segment.slope[3].abs(), slope], error, zone, far);
         } else if !segment.is_opaque() {
             made.edge += edge([own, own], [segment.slope[3].abs(); 2], error, zone, far);
         }
-        if own > 1.0 - 1e-9 && segment.slope[3] != 0.0 {
+        if slope > 0.0 && segment.slope[3] != 0.0 {
             made.ratio = made.ratio.min(slope / segment.slope[3].abs());
+        } else if other < 1.0 {
+            made.floor = made.floor.min(1.0 - other);
         }
     }
     for c in (0..3).filter(|&c| local.field.drives[c]) {
-        let wrong = next.slope[c].abs() * error + (segment.at(c, knot) - next.at(c, knot)).abs();
+        let wrong = next.slope[c].abs() * error + (here[c] - there[c]).abs();
         if wrong <= 1e-12 {
             made.color_error = made.color_error.max(wrong);
         } else {
@@ -339,7 +374,7 @@ fn zone(value: &Cubic, end: f64, far: f64, error: f64) -> f64 {
 fn edge(opacity: [f64; 2], slope: [f64; 2], error: f64, zone: f64, far: f64) -> f64 {
     let one = |a: f64, slope: f64| {
         let least = 1.0 - a - 4.0 * slope * error;
-        if least > 1e-9 { -zone * least.ln() } else { log_bound(zone, slope * far * 0.5) }
+        if least > 0.5 * (1.0 - a) { -zone * least.ln() } else { log_bound(zone, slope * far * 0.5) }
     };
     one(opacity[0], slope[0]) + one(opacity[1], slope[1])
 }
@@ -352,9 +387,9 @@ fn loosen_ends(made: &mut Piece, loose: [bool; 2], dt: f64) {
             *certain &= length > 8.0 * dt;
         } else if made.kind == Kind::Smooth {
             let zone = 4.0 * dt / length;
-            let least = 1.0 - cubic::eval(&made.opacity, end) - made.opacity_error;
-            let most = 1.0 - cubic::eval(&made.opacity, -end).min(cubic::eval(&made.opacity, end));
-            made.edge += if least > 1e-9 { -2.0 * zone * least.ln() } else { 2.0 * log_bound(zone, most) };
+            let (near, far) = (cubic::eval(&made.rest, end), cubic::eval(&made.rest, -end));
+            let (least, most) = (near - made.opacity_error - 16.0 * EPS * near.max(far), near.max(far));
+            made.edge += if least > 0.5 * near { -2.0 * zone * least.ln() } else { 2.0 * log_bound(zone, most) };
         }
     }
 }

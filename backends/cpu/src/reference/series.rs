@@ -45,11 +45,12 @@ pub(super) struct Term {
 }
 
 impl Term {
+    /// From the opacity in the middle and 1 − opacity as a polynomial.
     /// `None` where the series would converge too slowly, or the error of opacity is not small
     /// against Q: then the stretch has to be halved.
-    pub fn new(opacity: &Cubic, opacity_error: f64, color: [Cubic; 3], kappa: f64) -> Option<Self> {
-        let rest = 1.0 - opacity[0];
-        let ratio = [-opacity[1] / rest, -opacity[2] / rest, -opacity[3] / rest];
+    pub fn new(opacity: f64, rest: &Cubic, opacity_error: f64, color: [Cubic; 3], kappa: f64) -> Option<Self> {
+        let [rest, linear, square, cube] = *rest;
+        let ratio = [linear / rest, square / rest, cube / rest];
         let [a, b, c] = ratio.map(f64::abs);
         let mut growth = 2.5 * a;
         if 5.0 * b > growth * growth {
@@ -61,9 +62,11 @@ impl Term {
         let growth = growth * (1.0 + 4.0 * EPS);
         let least = rest * (1.0 - (a + b + c));
         let usable = rest > 0.0 && growth < 0.6 && opacity_error < 0.05 * least;
-        // |ln(1 − e/Q)| ≤ 1.03·e/Q for e/Q < 0.05; 4·EPS for the logarithm itself.
-        let error = 2.0 * kappa * (1.06 * opacity_error / least);
-        usable.then(|| Self { kappa, log: -(-opacity[0]).ln_1p(), ratio, growth, error, color })
+        // |ln(1 − e/Q)| ≤ 1.03·e/Q for e/Q < 0.05; roundings of Q in proportion to what differs from 1.
+        let round = 16.0 * EPS * (opacity.abs().min(1.0) + a + b + c) / (1.0 - (a + b + c)).max(0.01);
+        let error = 2.0 * kappa * (1.06 * opacity_error / least + round);
+        let log = if opacity < 0.5 { -(-opacity).ln_1p() } else { -rest.ln() };
+        usable.then_some(Self { kappa, log, ratio, growth, error, color })
     }
 }
 
@@ -259,7 +262,8 @@ mod tests {
         ) {
             let scale = 1.0 - middle;
             let opacity = [middle, bend[0] * scale, bend[1] * scale, bend[2] * scale * 0.1];
-            let Some(term) = Term::new(&opacity, 0.0, [[0.0; 4]; 3], kappa) else { return Ok(()) };
+            let rest = [scale, -opacity[1], -opacity[2], -opacity[3]];
+            let Some(term) = Term::new(middle, &rest, 0.0, [[0.0; 4]; 3], kappa) else { return Ok(()) };
             let Some(sum) = Sum::new(&[term], 1.0) else { return Ok(()) };
             let sigma = |y: f64| -kappa * (-(opacity[0] + y * (opacity[1] + y * (opacity[2] + y * opacity[3])))).ln_1p();
             // Simpson's rule, fine enough to be exact to rounding.

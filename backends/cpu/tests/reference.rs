@@ -1,0 +1,22 @@
+//! The reference against closed forms, an independent integration, and itself.
+//!
+//! Truth here is either a formula or tanh-sinh quadrature of the definition, written without
+//! anything of the reference: see `common/mod.rs`.
+
+#[path = "reference/common.rs"]
+mod common;
+
+#[path = "reference/closed_forms.rs"]
+mod closed_forms;
+#[path = "reference/cubic_cells.rs"]
+mod cubic_cells;
+#[path = "reference/flat.rs"]
+mod flat;
+#[path = "reference/invariance.rs"]
+mod invariance;
+#[path = "reference/lattice.rs"]
+mod lattice;
+#[path = "reference/life.rs"]
+mod life;
+#[path = "reference/speed.rs"]
+mod speed;
