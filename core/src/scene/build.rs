@@ -142,12 +142,7 @@ struct Build<'a> {
 
 impl<'a> Build<'a> {
     fn refuse<T>(&mut self, path: &str, found: impl Into<String>, wanted: impl Into<String>) -> Option<T> {
-        let mut at = path;
-        // What was left out stands where its parent stands.
-        while self.scene.place(at).is_none() && !at.is_empty() {
-            at = at.rfind(['.', '[']).map_or("", |end| &at[..end]);
-        }
-        self.problems.push(Problem::new(self.scene.place(at), path, found, wanted));
+        self.problems.push(self.scene.problem(path, found, wanted));
         None
     }
 

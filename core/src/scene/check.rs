@@ -91,7 +91,8 @@ impl<'a> Check<'a> {
         let found = all.iter().find(|d| d.name == name).copied();
         if found.is_none() && !name.is_empty() {
             let known: Vec<_> = all.iter().map(|d| d.name.as_str()).collect();
-            let wanted = format!("a registered {}: {}", kind.name(), known.join(", "));
+            let list = if known.is_empty() { "none is".to_owned() } else { known.join(", ") };
+            let wanted = format!("a registered {}: {list}", kind.name());
             self.problems.push(self.scene.problem(path, format!("{name:?}"), wanted).near(name, known));
         }
         found
@@ -169,15 +170,13 @@ impl<'a> Check<'a> {
     /// Values that are declared as required but not given. A shape's unit distance is found when
     /// it is built, and what was given but could not be read is a problem already.
     fn missing(&mut self, declaration: &Declaration, path: &str, given: &BTreeMap<String, ParameterSpec>) {
-        let all = format!("{path}.parameters");
         for decl in declaration.parameters.iter().filter(|p| p.required && p.name != "unit_distance") {
-            let at = format!("{all}.{}", decl.name);
+            let at = format!("{path}.parameters.{}", decl.name);
             if given.contains_key(&decl.name) || self.scene.place(&at).is_some() {
                 continue;
             }
-            let spot = self.scene.place(&all).or_else(|| self.scene.place(path));
             let wanted = format!("{}: {}", types(decl), decl.description);
-            self.problems.push(Problem::new(spot, &at, "nothing", wanted));
+            self.problems.push(self.scene.problem(&at, "nothing", wanted));
         }
     }
 }

@@ -48,8 +48,8 @@ use crate::Registry;
 
 pub use build::{Scene, SceneError};
 pub use description::{
-    ActionSpec, AttributeSpec, AttributeValues, CameraSpec, DataSpec, GeometrySpec, ImageSpec, ParameterSpec, ShapeSpec,
-    TableEntries, TableSpec, TransformStep, VolumeSpec,
+    ActionSpec, AttributeSpec, AttributeValues, CameraSpec, DataSpec, GeometrySpec, ImageSpec, ParameterSpec,
+    ShapeSpec, TableEntries, TableSpec, TransformStep, VolumeSpec,
 };
 pub use document::{MAX_BYTES, MAX_DEPTH, MAX_NODES};
 pub use problem::{Problem, Problems, Spot};
@@ -143,8 +143,12 @@ impl SceneFile {
         self.places.0.get(path).copied()
     }
 
-    /// A problem with what has this path.
+    /// A problem with what has this path; what was left out stands where its parent stands.
     fn problem(&self, path: &str, found: impl Into<String>, wanted: impl Into<String>) -> Problem {
-        Problem::new(self.place(path), path, found, wanted)
+        let mut at = path;
+        while self.place(at).is_none() && !at.is_empty() {
+            at = at.rfind(['.', '[']).map_or("", |end| &at[..end]);
+        }
+        Problem::new(self.place(at), path, found, wanted)
     }
 }

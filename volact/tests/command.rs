@@ -1,0 +1,212 @@
+//! The built command: what it prints, writes and exits with.
+
+use std::{
+    fs,
+    path::Path,
+    process::{Command, Output},
+};
+
+/// Runs `volact` in a folder, without the user's config or environment.
+fn volact(folder: &Path, arguments: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_volact"));
+    command.current_dir(folder).args(arguments).env("VOLACT_CONFIG", "").env_remove("VOLACT_LOG");
+    command.output().expect("the command starts")
+}
+
+fn code(output: &Output) -> i32 {
+    output.status.code().unwrap_or(-1)
+}
+
+fn out(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stdout).into_owned()
+}
+
+fn err(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// A folder with a ball of 12³ voxels.
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let mut file = b"NRRD0004\ntype: uint8\ndimension: 3\nsizes: 12 12 12\nencoding: raw\n\n".to_vec();
+    for i in 0..12 * 12 * 12 {
+        let at = [i % 12, i / 12 % 12, i / 144].map(|v| f64::from(v) - 5.5);
+        let r = at.iter().map(|v| v * v).sum::<f64>().sqrt();
+        file.push((255.0 * (1.0 - r / 6.0)).clamp(0.0, 255.0) as u8);
+    }
+    fs::write(folder.path().join("ball.nrrd"), file).unwrap();
+    folder
+}
+
+const SCENE: &str = r#"Scene(
+    version: 1,
+    data: {"ball": (file: "ball.nrrd")},
+    shapes: [(
+        name: "ball",
+        shader: "lut",
+        parameters: {
+            "volume": Volume(data: "ball"),
+            "lookup_table": Table(points: [(20, (1, 0, 0), 0), (255, (1, 1, 1), 0.4)]),
+            "unit_distance": 1,
+        },
+    )],
+    image: (size: (40, 30)),
+)"#;
+
+#[test]
+fn help_and_version_read_well() {
+    let folder = tempfile::tempdir().unwrap();
+    let help = volact(folder.path(), &["--help"]);
+    assert_eq!(code(&help), 0);
+    for word in ["render", "info", "describe", "compare", "bench", "completions", "Exit codes", "VOLACT_LOG"] {
+        assert!(out(&help).contains(word), "{word} in {}", out(&help));
+    }
+    let version = volact(folder.path(), &["--version"]);
+    assert_eq!(out(&version), concat!("volact ", env!("CARGO_PKG_VERSION"), "\n"));
+    let render = out(&volact(folder.path(), &["render", "--help"]));
+    for word in ["--action", "--size", "--view", "--step", "--threads", "--set", "--option", "Examples"] {
+        assert!(render.contains(word), "{word} in {render}");
+    }
+}
+
+#[test]
+fn wrong_usage_fails_with_two() {
+    let folder = tempfile::tempdir().unwrap();
+    assert_eq!(code(&volact(folder.path(), &[])), 2);
+    assert_eq!(code(&volact(folder.path(), &["rendr"])), 2);
+    let size = volact(folder.path(), &["render", "x.ron", "--size", "0x3"]);
+    assert!(code(&size) == 2 && err(&size).contains("wanted 640x480 or 512"), "{}", err(&size));
+    let view = volact(folder.path(), &["render", "x.ron", "--view", "frnt"]);
+    assert!(err(&view).contains("did you mean \"front\"?"), "{}", err(&view));
+    let set = volact(folder.path(), &["render", "x.ron", "--set", "a"]);
+    assert!(err(&set).contains("wanted NAME=VALUE"), "{}", err(&set));
+}
+
+#[test]
+fn bare_volume_just_works() {
+    let folder = folder();
+    let output = volact(folder.path(), &["render", "ball.nrrd", "--size", "32", "--action", "cpu"]);
+    assert_eq!(code(&output), 0, "{}", err(&output));
+    assert!(out(&output).starts_with("ball.png: 32 × 32 pixels\n"), "{}", out(&output));
+    for word in ["drawn   ball", "how     cpu: ", "speed   "] {
+        assert!(out(&output).contains(word), "{word} in {}", out(&output));
+    }
+    let picture = volact_files::picture::load_picture(&folder.path().join("ball.png")).unwrap();
+    assert_eq!((picture.width, picture.height), (32, 32));
+    let lit = picture.rgba.iter().filter(|p| p[0] + p[1] + p[2] > 0.1).count();
+    assert!((50..1000).contains(&lit), "{lit} pixels show the ball");
+}
+
+#[test]
+fn scene_is_drawn_by_the_first_preferred_action_that_can() {
+    let folder = folder();
+    fs::write(folder.path().join("scene.ron"), SCENE).unwrap();
+    fs::write(folder.path().join("config.ron"), r#"(version: 1, prefer: ["null", "vulkn", "cpu"])"#).unwrap();
+    let output = volact(folder.path(), &["render", "scene.ron", "--config", "config.ron", "-o", "a.npy", "--json"]);
+    assert_eq!(code(&output), 0, "{}", err(&output));
+    let report: serde_json::Value = serde_json::from_str(&out(&output)).unwrap();
+    assert_eq!(report["action"], "cpu");
+    assert_eq!(report["refused"][0]["why"], "does not composite by \"over\" (shape \"ball\")");
+    assert_eq!(report["refused"][1]["why"], "not registered");
+    assert_eq!((report["width"].as_u64(), report["height"].as_u64()), (Some(40), Some(30)));
+    let picture = volact_files::picture::load_picture(&folder.path().join("a.npy")).unwrap();
+    assert_eq!(picture.rgba.len(), 1200);
+}
+
+#[test]
+fn settings_change_the_picture_and_stated_defaults_do_not() {
+    let folder = folder();
+    fs::write(folder.path().join("scene.ron"), SCENE).unwrap();
+    let draw = |name: &str, more: &[&str]| {
+        let mut arguments = vec!["render", "scene.ron", "--action", "cpu", "-q", "-o", name];
+        arguments.extend(more);
+        let output = volact(folder.path(), &arguments);
+        assert_eq!((code(&output), out(&output)), (0, String::new()), "{}", err(&output));
+        fs::read(folder.path().join(name)).unwrap()
+    };
+    let plain = draw("plain.npy", &[]);
+    let stated = ["--threads", "1", "--set", "unit_distance=1", "--set", "ball.component=0", "--view", "front"];
+    assert!(plain == draw("stated.npy", &stated), "defaults stated change nothing");
+    assert!(plain != draw("unit.npy", &["--set", "unit_distance=3"]));
+    assert!(plain != draw("step.npy", &["--step", "2", "--option", "classification=post"]));
+    assert!(plain != draw("mip.npy", &["--view", "iso"]));
+}
+
+#[test]
+fn errors_name_their_causes_and_leave_no_picture() {
+    let folder = folder();
+    let wrong = SCENE.replace("\"lut\"", "\"lit\"").replace("version: 1", "version: 9");
+    fs::write(folder.path().join("wrong.ron"), wrong).unwrap();
+    let output = volact(folder.path(), &["render", "wrong.ron"]);
+    assert_eq!(code(&output), 2);
+    let expected = "error: wrong.ron: cannot be drawn\n  \
+        because: wrong.ron:2:14: version: found 9, wanted 1, the version of the format that this build reads\n\
+        wrong.ron:6:17: shapes[0].shader: found \"lit\", wanted a registered shader: ";
+    assert!(err(&output).starts_with(expected), "{}", err(&output));
+    let missing = volact(folder.path(), &["render", "nowhere.nrrd"]);
+    assert!(code(&missing) == 2 && err(&missing).contains("  because: nowhere.nrrd: cannot be read\n"));
+    let format = volact(folder.path(), &["render", "ball.nrrd", "-o", "a.jpg"]);
+    assert_eq!(err(&format), "error: a.jpg: extension is .jpg, wanted .png, .exr or .npy\n");
+    let place = volact(folder.path(), &["render", "ball.nrrd", "-o", "no/a.png"]);
+    assert_eq!(err(&place), "error: no/a.png: the folder no is not there\n");
+    let action = volact(folder.path(), &["render", "ball.nrrd", "--action", "cpuu"]);
+    assert!(err(&action).contains("did you mean \"cpu\"?"), "{}", err(&action));
+    let option = volact(folder.path(), &["render", "ball.nrrd", "--action", "cpu", "--option", "thraeds=2"]);
+    assert!(err(&option).contains("did you mean \"threads\"?"), "{}", err(&option));
+    let shape = volact(folder.path(), &["render", "ball.nrrd", "--set", "bal.unit_distance=2"]);
+    assert!(code(&shape) == 2 && err(&shape).contains("no shape is called \"bal\""), "{}", err(&shape));
+    let parameter = volact(folder.path(), &["render", "ball.nrrd", "--set", "unit_distanse=2"]);
+    assert!(err(&parameter).contains("did you mean \"unit_distance\"?"), "{}", err(&parameter));
+    let pictures = fs::read_dir(folder.path()).unwrap().filter_map(Result::ok);
+    let names: Vec<_> = pictures.map(|e| e.file_name().into_string().unwrap()).collect();
+    assert!(names.iter().all(|n| n == "ball.nrrd" || n == "wrong.ron"), "{names:?}");
+}
+
+#[test]
+fn wrong_config_is_an_error_with_its_place() {
+    let folder = folder();
+    fs::write(folder.path().join("config.ron"), "(version: 1, prefer: [])").unwrap();
+    let output = volact(folder.path(), &["render", "ball.nrrd", "--config", "config.ron"]);
+    assert_eq!(code(&output), 2);
+    let expected = "error: the config cannot be used\n  because: config.ron:1:22: prefer: found a list of 0 values, \
+        wanted at least one action's name\n";
+    assert_eq!(err(&output), expected);
+}
+
+#[test]
+fn describe_lists_and_tells_in_full() {
+    let folder = tempfile::tempdir().unwrap();
+    let list = out(&volact(folder.path(), &["describe"]));
+    for word in ["actions\n", "\nshaders\n", "\ngeometries\n", "\nloaders\n", "  cpu ", "  lut ", "  block ", "  nrrd "] {
+        assert!(list.contains(word), "{word:?} in {list}");
+    }
+    let lut = out(&volact(folder.path(), &["describe", "lut"]));
+    for word in ["composited by over", "unit_distance: float; required; above 0; in world units", "component: int; default 0; 0 to 3"] {
+        assert!(lut.contains(word), "{word:?} in {lut}");
+    }
+    let none = volact(folder.path(), &["describe", "ltu"]);
+    assert!(code(&none) == 2 && err(&none).contains("nothing is called \"ltu\"; did you mean \"lut\"?"));
+}
+
+#[test]
+fn completions_know_the_commands() {
+    let folder = tempfile::tempdir().unwrap();
+    for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
+        let script = volact(folder.path(), &["completions", shell]);
+        assert!(code(&script) == 0 && out(&script).contains("--straight-alpha"), "{shell}");
+    }
+}
+
+#[test]
+fn log_level_comes_from_the_flag_and_the_environment() {
+    let folder = folder();
+    let draw = |more: &[&str], log: Option<&str>| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_volact"));
+        command.current_dir(folder.path()).args(["render", "ball.nrrd", "--action", "null", "--size", "4"]).args(more);
+        command.env("VOLACT_CONFIG", "").env_remove("VOLACT_LOG").envs(log.map(|level| ("VOLACT_LOG", level)));
+        err(&command.output().unwrap())
+    };
+    assert_eq!(draw(&[], None), "");
+    assert!(draw(&["-v"], None).contains("[unit-distance-defaulted]"));
+    assert!(draw(&[], Some("debug")).contains("read by loader nrrd"));
+}
