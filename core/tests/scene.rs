@@ -263,3 +263,27 @@ fn mutated_scenes_end() {
         }
     }
 }
+
+/// The examples of the format's document are read as they stand there.
+#[test]
+fn documented_examples_are_right() {
+    let text = include_str!("../../docs/scene-format.md");
+    let mut read = 0;
+    for block in text.split("```ron\n").skip(1).filter_map(|rest| rest.split("```").next()) {
+        let read_as = if block.starts_with("Scene") {
+            SceneFile::parse(block).map(|_| ())
+        } else if block.starts_with("Config") {
+            let config = volact_core::config::Config::parse(block);
+            config.map(|config| assert_eq!(config.prefer, volact_core::config::PREFERRED))
+        } else {
+            let camera =
+                |line: &str| SceneFile::parse(&format!("(version: 1, shapes: [], camera: {line}\n)")).map(|_| ());
+            let row = "((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1))";
+            let lines = block.lines().map(|line| line.replace("((…), (…), (…), (…))", row));
+            lines.into_iter().try_for_each(|line| camera(&line))
+        };
+        assert_eq!(read_as.map_err(|p| p.to_string()), Ok(()), "{block}");
+        read += 1;
+    }
+    assert_eq!(read, 3);
+}
