@@ -2,9 +2,7 @@
 
 use volact_core::{
     Appearance, Camera, ControlPoint, FrameDesc, LookupTable, Registry, ScalarType, Shape, Volume, VolumeDesc,
-    VolumeTexture,
-    glam::DVec3,
-    resolve::ResolvedShape,
+    VolumeTexture, glam::DVec3, resolve::ResolvedShape,
 };
 use volact_cpu::reference::{ReferenceOptions, ReferencePicture, integrate};
 
