@@ -63,7 +63,10 @@ impl Args {
     fn png(&self, output: &Path) -> anyhow::Result<PngOptions> {
         let format = PictureFormat::of(output)?;
         if format != PictureFormat::Png && (self.straight_alpha || self.sixteen_bit) {
-            bail!("{}: --straight-alpha and --sixteen-bit are for .png; the others hold what was drawn", output.display());
+            bail!(
+                "{}: --straight-alpha and --sixteen-bit are for .png; the others hold what was drawn",
+                output.display()
+            );
         }
         let folder = output.parent().filter(|p| !p.as_os_str().is_empty());
         if let Some(folder) = folder.filter(|p| !p.is_dir()) {
@@ -80,7 +83,9 @@ const ENDINGS: [&str; 13] =
 /// The input's name without its extension, as `.png` in the current folder.
 fn default_output(input: &Path) -> anyhow::Result<PathBuf> {
     let name = input.file_name().map(|name| name.to_string_lossy().into_owned());
-    let Some(mut stem) = name else { bail!("{}: has no name to call the picture by; give one with -o", input.display()) };
+    let Some(mut stem) = name else {
+        bail!("{}: has no name to call the picture by; give one with -o", input.display())
+    };
     for ending in ENDINGS {
         stem = stem.strip_suffix(ending).filter(|s| !s.is_empty()).map_or(stem.clone(), str::to_owned);
     }

@@ -107,7 +107,8 @@ pub fn config(named: Option<PathBuf>) -> anyhow::Result<Config> {
 
 fn user_config() -> Option<PathBuf> {
     let folder = |name: &str| env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
-    let base = folder("XDG_CONFIG_HOME").or_else(|| folder("APPDATA")).or_else(|| Some(folder("HOME")?.join(".config")));
+    let base =
+        folder("XDG_CONFIG_HOME").or_else(|| folder("APPDATA")).or_else(|| Some(folder("HOME")?.join(".config")));
     Some(base?.join("volact").join("config.ron"))
 }
 

@@ -176,14 +176,9 @@ impl Args {
     }
 
     /// A shader of the user's choice shows the data's own range in grey.
-    fn other_look(
-        &self,
-        shader: &str,
-        volume: &Volume,
-        registry: &Registry,
-        notes: &mut Vec<String>,
-    ) -> Appearance {
-        let known = |name: &str| registry.shaders().get(shader).is_some_and(|s| s.declaration.parameter(name).is_some());
+    fn other_look(&self, shader: &str, volume: &Volume, registry: &Registry, notes: &mut Vec<String>) -> Appearance {
+        let known =
+            |name: &str| registry.shaders().get(shader).is_some_and(|s| s.declaration.parameter(name).is_some());
         let range = volume.value_range().unwrap_or([0.0, 1.0]);
         notes.clear();
         let mut appearance = Appearance::new(shader);
