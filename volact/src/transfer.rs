@@ -119,42 +119,80 @@ const WHITE: [f64; 3] = [1.0, 1.0, 1.0];
 
 fn intensity(volume: &Volume, statistics: &Statistics, mut notes: Vec<String>) -> Automatic {
     let background = statistics.background();
-    let Background { value, edge, sign } = background;
-    let inside = |v: f64| (v - edge) * sign > 0.0;
+    let inside = |v: f64| background.distance(v) > background.margin;
     let (view, subject) = choose_view(volume, statistics, inside);
-    let top = if sign > 0.0 { statistics.percentile(0.9995) } else { statistics.percentile(0.0005) };
-    // Distances from the background from here on: the subject's are positive.
-    let far = |v: f64| (v - value) * sign;
-    let distances = statistics.sorted.iter().map(|&v| far(f64::from(v))).filter(|d| *d > far(edge));
-    let histogram = Histogram::of(distances, far(edge), far(top).max(far(edge) * 1.001));
-    let (split, certainty) = histogram.otsu();
-    let mean = |lo: f64, hi: f64| {
-        let within = (0..statistics::BINS).filter(|b| (lo..hi).contains(&histogram.value(*b)));
-        let (n, sum) = within
-            .fold((0.0, 0.0), |(n, s), b| (n + histogram.counts[b], s + histogram.counts[b] * histogram.value(b)));
-        if n > 0.0 { sum / n } else { 0.5 * (lo + hi) }
-    };
-    let (soft, dense) = (mean(0.0, split), mean(split, f64::INFINITY));
-    notes.push(format!(
-        "background {value:.5}, subject from {edge:.5}, soft about {:.5}, dense above {:.5} about {:.5} ({certainty:.2})",
-        value + sign * soft, value + sign * split, value + sign * dense
-    ));
+    let classes = Classes::new(statistics, &background);
+    notes.push(classes.describe(&background));
     let axis = view_axis(volume, view);
     let along = smallest_units(volume, axis) * statistics.stride as f64;
-    let chord_soft = statistics.chord(axis, |v| inside(v) && far(v) < split) * along;
-    let chord_dense = statistics.chord(axis, |v| far(v) >= split) * along;
-    let (thin, thick) = (opacity(DEPTH[0], chord_soft), opacity(DEPTH[1], chord_dense));
-    let first = 0.5 * far(edge) + 0.5 * soft.min(2.0 * far(edge));
-    let at = |d: f64, color, opacity| point(value + sign * d, color, opacity);
-    let table = table(vec![
-        at(far(edge), OUTLINE, 0.0),
-        at(first.max(far(edge) * 1.01), OUTLINE, thin),
-        at(soft.max(far(edge) * 1.02), SOFT, thin),
-        at(split, SOFT.map(|c| c * 0.6), thin.max(0.3 * thick)),
-        at(dense, BONE, thick),
-        at(far(top).max(dense * 1.01), WHITE, thick),
-    ]);
-    Automatic { shader: "lut".into(), table, view, subject, filter: Filter::Linear, notes }
+    let soft = statistics.chord(axis, |v| inside(v) && background.distance(v) < classes.split) * along;
+    let dense = statistics.chord(axis, |v| background.distance(v) >= classes.split) * along;
+    let points = classes.points(&background, opacity(DEPTH[0], soft), opacity(DEPTH[1], dense));
+    Automatic { shader: "lut".into(), table: table(points), view, subject, filter: Filter::Linear, notes }
+}
+
+/// The subject in two, as distances from the background's value.
+struct Classes {
+    /// Mean of what is soft.
+    soft: f64,
+    /// Where the dense begins.
+    split: f64,
+    /// Mean of what is dense.
+    dense: f64,
+    /// About the greatest.
+    top: f64,
+}
+
+impl Classes {
+    fn new(statistics: &Statistics, background: &Background) -> Self {
+        let all = statistics.sorted.iter().map(|&v| background.distance(f64::from(v)));
+        let mut distances: Vec<f64> = all.filter(|d| *d > background.margin).collect();
+        distances.sort_by(f64::total_cmp);
+        let top = distances.get(distances.len() * 999 / 1000).copied().unwrap_or(background.margin * 2.0);
+        let split = Histogram::of(distances.iter().copied(), background.margin, top).otsu();
+        let (soft, dense) = distances.split_at(distances.partition_point(|d| *d < split));
+        let mean = |part: &[f64], none: f64| match part.len() {
+            0 => none,
+            n => part.iter().sum::<f64>() / n as f64,
+        };
+        Self { soft: mean(soft, 0.5 * (background.margin + split)), split, dense: mean(dense, top), top }
+    }
+
+    fn describe(&self, background: &Background) -> String {
+        let value = |distance: f64| short(background.at(distance));
+        let side = if background.sign > 0.0 { "above" } else { "below" };
+        format!(
+            "background {}, subject from {}, soft about {}, dense {side} {} about {}",
+            value(0.0),
+            value(background.margin),
+            value(self.soft),
+            value(self.split),
+            value(self.dense)
+        )
+    }
+
+    /// The table, from opacities for what is soft and what is dense.
+    fn points(&self, background: &Background, thin: f64, thick: f64) -> Vec<ControlPoint> {
+        let edge = background.margin;
+        let outline = 0.5 * (edge + self.soft.min(2.0 * edge));
+        let shell = SOFT.map(|c| c * 0.6);
+        let rows = [
+            (edge, OUTLINE, 0.0),
+            (outline, OUTLINE, thin),
+            (self.soft, SOFT, thin),
+            (self.split, shell, thin.max(0.3 * thick)),
+            (self.dense, BONE, thick),
+            (self.top, WHITE, thick),
+        ];
+        // Rising, whatever the classes: two points never share a value, so none gets lost.
+        let mut last = f64::NEG_INFINITY;
+        let step = edge * 1e-3;
+        let rising = rows.into_iter().map(|(distance, color, opacity)| {
+            last = distance.max(last + step);
+            point(background.at(last), color, opacity)
+        });
+        rising.collect()
+    }
 }
 
 fn segmentation(volume: &Volume, statistics: &Statistics, labels: &BTreeSet<i64>, mut notes: Vec<String>) -> Automatic {
@@ -203,7 +241,8 @@ fn distinct_color(index: usize) -> [f64; 3] {
     let hue = (0.02 + index as f64 * 0.618_033_988_75).fract() * 6.0;
     let saturation = [0.75, 0.45, 0.6][index % 3];
     let channel = |shift: f64| {
-        1.0 - saturation * (1.0 - ((hue + shift).rem_euclid(6.0) - 3.0).abs().min(2.0).max(1.0) + 1.0).clamp(0.0, 1.0)
+        let ramp = (((hue + shift).rem_euclid(6.0) - 3.0).abs() - 1.0).clamp(0.0, 1.0);
+        1.0 - saturation * (1.0 - ramp)
     };
     [channel(0.0), channel(4.0), channel(2.0)]
 }
@@ -270,6 +309,11 @@ fn smallest_units(volume: &Volume, axis: usize) -> f64 {
 /// The opacity over one unit distance that gives an optical depth over a length in such units.
 fn opacity(depth: f64, length: f64) -> f64 {
     1.0 - (-depth / length.max(1.0)).exp()
+}
+
+/// A number with four digits that matter.
+fn short(v: f64) -> f64 {
+    format!("{v:.3e}").parse().unwrap_or(v)
 }
 
 fn point(value: f64, color: [f64; 3], opacity: f64) -> ControlPoint {

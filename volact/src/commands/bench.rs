@@ -200,11 +200,10 @@ fn to_text(rows: &[Row], [width, height]: [usize; 2], args: &Args) -> String {
         let (first, spread, ratio) = (row.first * 1e3, q3 - q1, row.median() / rows[0].median());
         _ = writeln!(
             text,
-            "{:<12}{first:>10.2}{median:>10.2}{spread:>10.2}{least:>10.2}{most:>10.2}{:>12.1}{ratio:>8.2}  {}, {} threads",
+            "{:<12}{first:>10.2}{median:>10.2}{spread:>10.2}{least:>10.2}{most:>10.2}{:>12.1}{ratio:>8.2}  {}",
             row.action,
             row.rate(),
-            row.device,
-            row.threads
+            row.device
         );
     }
     text
@@ -274,7 +273,7 @@ mod tests {
         let value: Value = serde_json::from_str(&text).unwrap();
         assert_eq!(value["actions"][1]["ratio"], json!(2.5));
         assert_eq!(value["actions"][0]["samples_per_s"], json!(2e8));
-        assert!(to_text(&[row("cpu", 0.02), row("other", 0.05)], [8, 4], &args()).contains("2.50  here, 2 threads"));
+        assert!(to_text(&[row("cpu", 0.02), row("other", 0.05)], [8, 4], &args()).contains("2.50  here"));
     }
 
     #[test]

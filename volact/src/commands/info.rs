@@ -18,6 +18,7 @@ use volact::{
     transfer,
 };
 
+use super::settings::{self, Setting};
 use chart::{Chart, Style};
 use values::{PERCENTILES, Values};
 
@@ -29,6 +30,9 @@ pub struct Args {
     /// Read with this loader instead of the one that knows the content
     #[arg(long, value_name = "NAME")]
     loader: Option<String>,
+    /// An option of the loader, e.g. those of raw files: dims=(64, 64, 64)
+    #[arg(long = "load", value_name = "NAME=VALUE")]
+    load: Vec<Setting>,
     /// Look at the header only: no values, no histogram
     #[arg(long)]
     header: bool,
@@ -52,7 +56,7 @@ pub struct Args {
 /// If the file cannot be read, or has no such component.
 pub fn run(args: Args, registry: &Registry) -> anyhow::Result<ExitCode> {
     let loader = choose(registry, &args)?;
-    let mut reader = open(loader.as_ref(), &args.file)?;
+    let mut reader = open(loader.as_ref(), &args.file, &settings::options(&args.load)?)?;
     let desc = reader.desc().clone();
     anyhow::ensure!(
         args.component < desc.components,
@@ -87,9 +91,9 @@ fn choose(registry: &Registry, args: &Args) -> anyhow::Result<std::sync::Arc<dyn
     })
 }
 
-fn open(loader: &dyn Loader, path: &Path) -> anyhow::Result<Box<dyn VolumeReader>> {
+fn open(loader: &dyn Loader, path: &Path, options: &LoadOptions) -> anyhow::Result<Box<dyn VolumeReader>> {
     let declaration = loader.declaration();
-    let options = declaration.resolve(&LoadOptions::new(), |_| false).map_err(|problems| LoadError::Options {
+    let options = declaration.resolve(options, |_| false).map_err(|problems| LoadError::Options {
         loader: declaration.name.clone(),
         problem: problems.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "),
     })?;

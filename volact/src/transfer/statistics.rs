@@ -30,10 +30,23 @@ pub(crate) struct Statistics {
 pub(crate) struct Background {
     /// The commonest value at the volume's faces.
     pub value: f64,
-    /// The first value that is no longer background: noise lies on this side.
-    pub edge: f64,
+    /// Distance from it to the first value that is no longer background, positive: noise and
+    /// whatever else surrounds the subject lie nearer.
+    pub margin: f64,
     /// 1 where the subject's values lie above the background, −1 where below.
     pub sign: f64,
+}
+
+impl Background {
+    /// How far a value lies from the background on the subject's side.
+    pub fn distance(&self, value: f64) -> f64 {
+        (value - self.value) * self.sign
+    }
+
+    /// The value at a distance.
+    pub fn at(&self, distance: f64) -> f64 {
+        self.value + self.sign * distance
+    }
 }
 
 impl Statistics {
@@ -122,7 +135,9 @@ impl Statistics {
 
     /// What surrounds the subject, from the samples on the volume's faces.
     pub fn background(&self) -> Background {
-        let [lo, hi] = [self.percentile(0.001), self.percentile(0.999)];
+        let ends = |part: f64| [self.percentile(part), self.percentile(1.0 - part)];
+        // Of a volume that is nearly all background only the extremes show that there is a subject.
+        let [lo, hi] = Some(ends(0.001)).filter(|[lo, hi]| lo < hi).unwrap_or(ends(0.0));
         let border = Histogram::of(self.border(), lo, hi);
         // Noise may put the fullest bin anywhere in a broad peak; its median is its middle.
         let peak = border.mode();
@@ -144,9 +159,9 @@ impl Statistics {
         let margin = (3.5 * spread(sign)).max(0.02 * (hi - lo)).min(0.3 * (hi - lo));
         let far = |v: f64| (v - mode) * sign;
         let all = self.sorted.iter().map(|&v| far(f64::from(v)).max(0.0));
-        let (split, _) = Histogram::of(all, 0.0, far(lo).max(far(hi))).otsu();
+        let split = Histogram::of(all, 0.0, far(lo).max(far(hi))).otsu();
         let margin = margin.max(0.85 * self.surroundings(far, split) + 0.15 * split);
-        Background { value: mode, edge: mode + sign * margin, sign }
+        Background { value: mode, margin, sign }
     }
 
     /// Where several things surround the subject (air, and what was not scanned), the volume's
@@ -274,16 +289,15 @@ impl Histogram {
     }
 
     /// The value that best splits the counts in two (N. Otsu, *A threshold selection method from
-    /// gray-level histograms*, IEEE Trans. SMC 9(1), 1979) and how well: the share of the variance
-    /// that lies between the two classes.
-    pub fn otsu(&self) -> (f64, f64) {
-        let total: f64 = self.counts.iter().sum();
-        let moment = |n: i32| (0..BINS).map(|b| (b as f64).powi(n) * self.counts[b]).sum::<f64>() / total.max(1.0);
-        let (mean, variance) = (moment(1), moment(2) - moment(1).powi(2));
+    /// gray-level histograms*, IEEE Trans. SMC 9(1), 1979): the variance between the two classes
+    /// is greatest.
+    pub fn otsu(&self) -> f64 {
+        let total = self.counts.iter().sum::<f64>().max(1.0);
+        let mean = (0..BINS).map(|b| b as f64 * self.counts[b]).sum::<f64>() / total;
         let (mut below, mut sum, mut best) = (0.0, 0.0, (BINS / 2, 0.0));
         for b in 0..BINS - 1 {
-            below += self.counts[b] / total.max(1.0);
-            sum += b as f64 * self.counts[b] / total.max(1.0);
+            below += self.counts[b] / total;
+            sum += b as f64 * self.counts[b] / total;
             if below > 0.0 && below < 1.0 {
                 let between = (mean * below - sum).powi(2) / (below * (1.0 - below));
                 if between > best.1 {
@@ -291,7 +305,34 @@ impl Histogram {
                 }
             }
         }
-        let at = self.lo + best.0 as f64 / BINS as f64 * (self.hi - self.lo);
-        (at, if variance > 0.0 { best.1 / variance } else { 0.0 })
+        self.lo + best.0 as f64 / BINS as f64 * (self.hi - self.lo)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn otsu_splits_two_heaps_between_them() {
+        let values = (0..900).map(|i| 10.0 + f64::from(i % 5)).chain((0..100).map(|i| 80.0 + f64::from(i % 9)));
+        let split = Histogram::of(values, 0.0, 100.0).otsu();
+        assert!((14.0..80.0).contains(&split), "{split}");
+    }
+
+    #[test]
+    fn mode_is_the_end_where_most_lie_there() {
+        let values = [0.0, 0.0, 0.0, 0.4, 0.5, 1.0];
+        assert_eq!(Histogram::of(values.into_iter(), 0.0, 1.0).mode(), 0.0);
+    }
+
+    #[test]
+    fn padding_is_common_and_far_below() {
+        let scan: Vec<f32> = (0..1000).map(|i| -1000.0 + 2.0 * i as f32).collect();
+        let with = |low: f32, n: usize| [vec![low; n], scan.clone()].concat();
+        assert_eq!(padding(&with(-1500.0, 100)), Some(-1500.0));
+        assert_eq!(padding(&with(-1500.0, 1)), None);
+        assert_eq!(padding(&with(-1001.0, 100)), None);
+        assert_eq!(padding(&[]), None);
     }
 }

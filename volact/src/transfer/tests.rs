@@ -150,6 +150,15 @@ fn materials_with_smooth_surfaces_are_no_labels() {
 }
 
 #[test]
+fn a_lonely_subject_is_found_and_all_else_vanishes() {
+    let value = |[x, y, z]: [usize; 3]| if [x, y, z] == [20, 21, 22] { 9.5 } else { 1.25 };
+    let automatic = automatic(&volume(desc(40), value));
+    assert_eq!(resolve(&automatic).classify(1.25)[3], 0.0);
+    assert!(resolve(&automatic).classify(9.5)[3] > 0.5);
+    assert!(automatic.subject.size().max_element() < 8.0);
+}
+
+#[test]
 fn a_constant_volume_is_a_faint_box_with_a_note() {
     let automatic = automatic(&volume(desc(8), |_| 5.0));
     let opacity = resolve(&automatic).classify(5.0)[3];
@@ -165,6 +174,7 @@ fn odd_volumes_neither_panic_nor_give_unusable_cameras() {
             let value = |[x, y, z]: [usize; 3]| [f64::NAN, f64::INFINITY, noise(x, y, z), 1e30 * x as f64][kind];
             let automatic = automatic(&volume(desc, value));
             automatic.frame(32, 24).validate().unwrap();
+            assert!(automatic.table.is_some(), "{dims:?} {kind}");
         }
     }
 }
