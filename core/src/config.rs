@@ -10,7 +10,7 @@
 //!     prefer: ["wgpu", "vulkan", "cpu"],           // the first that can draw a scene is taken
 //!     options: {"cpu": {"threads": 2}},            // for each action, below what a scene says
 //!     image: (size: (640, 480), background: (0, 0, 0, 1)),
-//!     view: "iso",                                 // of bare volumes and scenes without a camera
+//!     view: "iso",                                 // of scenes that have no camera
 //! )"#)?;
 //! assert_eq!(config.prefer, ["wgpu", "vulkan", "cpu"]);
 //! assert_eq!(Config::parse("Config(version: 1)")?, Config::default());

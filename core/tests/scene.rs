@@ -163,7 +163,7 @@ fn defaults_stated_equal_defaults_left_out() {
         shapes: [Shape(name: None, geometry: Around, shader: "lut", transform: None, parameters: {
         "volume": Volume(data: Some("a"), data_roi: None, geometry_roi: None, range: None, filter: Linear, luminance: false),
         "lookup_table": Table(points: [(value: 0, color: (0, 0, 0), opacity: 0)], pre_interpolated: false)})],
-        camera: View("front"), image: Image(size: None, viewport: None, background: None, depth_threshold: None), action: None)"#;
+        camera: None, image: Image(size: None, viewport: None, background: None, depth_threshold: None), action: None)"#;
     assert_eq!(SceneFile::parse(short).unwrap(), SceneFile::parse(long).unwrap());
 }
 
@@ -172,7 +172,7 @@ fn everything_can_be_said() {
     let text = include_str!("full_scene.ron");
     let scene = SceneFile::parse(text).unwrap_or_else(|p| panic!("{p}"));
     assert_eq!(scene.shapes.len(), 3);
-    let CameraSpec::Camera(Camera::Matrices { view, .. }) = scene.camera else { panic!("{:?}", scene.camera) };
+    let Some(CameraSpec::Camera(Camera::Matrices { view, .. })) = scene.camera else { panic!("{:?}", scene.camera) };
     assert_eq!(view.w_axis.z, -5.0);
     assert_eq!(scene.shapes[1].transform.as_ref().unwrap()[1], TransformStep::Scale(DVec3::splat(2.0)));
     let named = matches!(&scene.shapes[2].geometry, GeometrySpec::Named { name, .. } if name == "block");
@@ -222,7 +222,10 @@ fn transform_steps_apply_in_order() {
     let transform: DAffine3 = built.shapes[0].state().transform;
     assert!((transform.transform_point3(DVec3::ZERO) - DVec3::new(0.0, 2.0, 0.0)).length() < 1e-12);
     assert_eq!((built.frame.width, built.frame.height), (512, 512));
-    scene.camera = CameraSpec::View(View::Top);
+    scene.camera = Some(CameraSpec::View(View::Front));
+    let frame = scene.build(&registry, Path::new(""), &NoProgress).unwrap().frame;
+    assert_eq!(frame, built.frame, "the default stated");
+    scene.camera = Some(CameraSpec::View(View::Top));
     assert_ne!(scene.build(&registry, Path::new(""), &NoProgress).unwrap().frame.camera, built.frame.camera);
 }
 

@@ -290,7 +290,7 @@ impl<'a> Build<'a> {
         let image = &self.scene.image;
         let [width, height] = image.size.unwrap_or([512, 512]);
         let (w, h) = image.viewport.map_or((width, height), |v| (v.width, v.height));
-        let mut frame = match self.scene.camera {
+        let mut frame = match self.scene.camera.unwrap_or_default() {
             CameraSpec::View(view) => FrameDesc::fit_all(shapes, view, w, h),
             CameraSpec::Camera(camera) => FrameDesc::new(camera, w, h),
         };

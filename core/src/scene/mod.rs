@@ -70,8 +70,8 @@ pub struct SceneFile {
     pub data: BTreeMap<String, DataSpec>,
     /// What to draw, in this order.
     pub shapes: Vec<ShapeSpec>,
-    /// From where.
-    pub camera: CameraSpec,
+    /// From where; whoever draws chooses where `None`, and nobody else does: from the front.
+    pub camera: Option<CameraSpec>,
     /// Into what.
     pub image: ImageSpec,
     /// With which action; whoever draws chooses where `None`.

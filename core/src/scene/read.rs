@@ -43,7 +43,7 @@ fn scene(reader: &mut Reader, at: &At) -> Option<SceneFile> {
         scene.shapes = shapes.iter().map(|at| shape(reader, at).unwrap_or_default()).collect();
         unique_names(reader, &shapes, &scene);
     }
-    scene.camera = fields.optional("camera").and_then(|at| camera(reader, &at)).unwrap_or_default();
+    scene.camera = fields.optional("camera").and_then(|at| camera(reader, &at));
     scene.image = fields.optional("image").and_then(|at| image(reader, &at)).unwrap_or_default();
     scene.action = fields.optional("action").and_then(|at| action(reader, &at));
     Some(scene)

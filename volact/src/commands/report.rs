@@ -139,9 +139,10 @@ fn describe(shape: &Shape) -> String {
     let mut text = format!("{}: shader {}, geometry {}", shape.name(), state.shader, state.geometry.name());
     if let Some(texture) = texture(shape) {
         let (desc, [x, y, z]) = (texture.volume().desc(), texture.data_roi().dims());
-        _ = write!(text, ", {x} × {y} × {z} samples of {} {}", desc.components, desc.scalar);
+        let several = if desc.components > 1 { format!("{} × ", desc.components) } else { String::new() };
+        _ = write!(text, ", {x} × {y} × {z} samples of {several}{}", desc.scalar);
     }
-    if let Some(ParameterValue::Float(unit)) = state.parameters.get("unit_distance") {
+    if let Some(unit) = state.parameters.get("unit_distance").and_then(ParameterValue::as_float) {
         _ = write!(text, ", unit distance {unit:.4}");
     }
     text

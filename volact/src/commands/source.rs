@@ -133,11 +133,8 @@ impl Args {
             let (shape, parameter) = settings::shape_of(&setting.name, &names)?;
             file.set_parameter(shape, parameter, &setting.value);
         }
-        if let Some(view) = self.view {
-            file.camera = CameraSpec::View(view);
-        } else if file.camera == CameraSpec::default() {
-            file.camera = CameraSpec::View(config.view);
-        }
+        let view = self.view.map(CameraSpec::View);
+        file.camera = view.or(file.camera).or(Some(CameraSpec::View(config.view)));
         let Size(size) = self.size.unwrap_or(Size(file.image.size.unwrap_or(config.size)));
         file.image.size = Some(size);
         file.image.background = self.background.or(file.image.background).or(Some(config.background));
