@@ -8,9 +8,10 @@
 //! peak that touches 1) shrinks geometrically; the last bit is bounded by Remez's inequality.
 
 use super::{
+    border::log_bound,
     cubic,
     line::EPS,
-    piece::{Kind, Piece, log_bound},
+    piece::{Kind, Piece},
     series::{Sum, Term},
 };
 
@@ -125,9 +126,9 @@ impl March {
         let tie = count > 1.0 && !pieces.iter().all(|p| p.entry.is_some() && p.entry == pieces[0].entry);
         for p in opaque {
             wrong = wrong.max(p.color_error);
-            for c in 0..3 {
-                mean[c] += cubic::eval(&p.color[c], -1.0) / count;
-                spread = spread.max(2.0 * variation(&p.color[c]));
+            for (mean, c) in mean.iter_mut().zip(&p.color) {
+                *mean += cubic::eval(c, -1.0) / count;
+                spread = spread.max(2.0 * variation(c));
             }
         }
         if tie {
@@ -152,8 +153,8 @@ impl March {
     /// Changes the colour in D from where the ray is.
     fn jump(&mut self, to: [f64; 3]) {
         let (middle, half) = (0.5 * (self.t[0] + self.t[1]), 0.5 * (self.t[1] - self.t[0]));
-        for c in 0..3 {
-            let step = to[c] - self.color[c];
+        for (c, to) in to.iter().enumerate() {
+            let step = to - self.color[c];
             if step != 0.0 {
                 self.d[c] += step * middle;
                 self.error[c] += step.abs() * (half + 4.0 * EPS * middle) + 2.0 * EPS * self.d[c].abs();
@@ -275,8 +276,8 @@ impl March {
         let (color, wrong) = sum.emit(&self.terms);
         let (middle, half) = (0.5 * (self.t[0] + self.t[1]), 0.5 * (self.t[1] - self.t[0]));
         let absorbed = -(-sum.depth).exp_m1();
-        for c in 0..3 {
-            let gain = color[c] - self.color[c] * absorbed;
+        for (c, gained) in color.into_iter().enumerate() {
+            let gain = gained - self.color[c] * absorbed;
             self.d[c] += middle * gain;
             let inner = wrong + self.color[c].abs() * (1.1 * sum.error + 4.0 * EPS);
             self.error[c] += half * gain.abs() + self.t[1] * inner + 8.0 * EPS * self.d[c].abs();

@@ -137,8 +137,8 @@ impl Sum {
     fn add_logarithm(&mut self, term: &Term) {
         let l = logarithm(&term.ratio, self.order);
         self.s[0] += term.kappa * term.log;
-        for n in 1..=self.order {
-            self.s[n] -= term.kappa * l[n];
+        for (s, l) in self.s.iter_mut().zip(l).skip(1) {
+            *s -= term.kappa * l;
         }
     }
 
