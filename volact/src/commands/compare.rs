@@ -75,12 +75,18 @@ impl Args {
         let below = [("psnr", self.psnr, found.psnr), ("ssim", self.ssim, found.ssim.unwrap_or(f64::NAN))];
         let mut passed = Vec::new();
         for (name, limit, value) in above {
-            passed
-                .extend(limit.filter(|l| !(value <= *l)).map(|l| format!("{name} is {value:.6}, wanted at most {l}")));
+            passed.extend(
+                limit
+                    .filter(|l| value.is_nan() || value > *l)
+                    .map(|l| format!("{name} is {value:.6}, wanted at most {l}")),
+            );
         }
         for (name, limit, value) in below {
-            passed
-                .extend(limit.filter(|l| !(value >= *l)).map(|l| format!("{name} is {value:.6}, wanted at least {l}")));
+            passed.extend(
+                limit
+                    .filter(|l| value.is_nan() || value < *l)
+                    .map(|l| format!("{name} is {value:.6}, wanted at least {l}")),
+            );
         }
         passed
     }
