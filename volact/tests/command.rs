@@ -177,11 +177,16 @@ fn wrong_config_is_an_error_with_its_place() {
 fn describe_lists_and_tells_in_full() {
     let folder = tempfile::tempdir().unwrap();
     let list = out(&volact(folder.path(), &["describe"]));
-    for word in ["actions\n", "\nshaders\n", "\ngeometries\n", "\nloaders\n", "  cpu ", "  lut ", "  block ", "  nrrd "] {
+    for word in ["actions\n", "\nshaders\n", "\ngeometries\n", "\nloaders\n", "  cpu ", "  lut ", "  block ", "  nrrd "]
+    {
         assert!(list.contains(word), "{word:?} in {list}");
     }
     let lut = out(&volact(folder.path(), &["describe", "lut"]));
-    for word in ["composited by over", "unit_distance: float; required; above 0; in world units", "component: int; default 0; 0 to 3"] {
+    for word in [
+        "composited by over",
+        "unit_distance: float; required; above 0; in world units",
+        "component: int; default 0; 0 to 3",
+    ] {
         assert!(lut.contains(word), "{word:?} in {lut}");
     }
     let none = volact(folder.path(), &["describe", "ltu"]);
