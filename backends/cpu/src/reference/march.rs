@@ -305,25 +305,26 @@ impl March {
                 (worst, chosen) = (own, *p);
             }
             let here = rest(a).max(rest(b)).max(rest(0.5 * (a + b)));
-            hopeless &= here <= 32.0 * wrong;
+            hopeless &= here <= 4.0 * wrong;
         }
         if depth > REST && width > 1e-14 && !hopeless {
             return false;
         }
         let at = |y: f64| chosen.color.map(|c| cubic::eval(&c, y));
         self.jump(at(a));
-        let (from, to) = (at(a), at(b));
         let other = others.min(1.0) * 2.0 * self.brightest;
-        let moved = (0..3).map(|c| (to[c] - from[c]).abs()).fold(0.0, f64::max);
-        self.add_error(self.t[1] * (2.0 * moved + chosen.color_error + other + 8.0 * EPS * self.brightest));
+        self.add_error(self.t[1] * (chosen.color_error + other + 8.0 * EPS * self.brightest));
         let length = 0.5 * (chosen.t[1] - chosen.t[0]);
         if self.depth.is_infinite() && self.likely * (-depth).exp() <= self.threshold {
             self.depth = chosen.t[0] + length * (a + 1.0);
         }
         self.t[0] *= (-depth).exp() * (1.0 - 8.0 * EPS);
         self.likely *= (-0.5 * depth).exp();
-        self.color = from;
-        self.jump(to);
+        // T lies in its interval all along, so by parts ∫ T dc is T's middle times the change of c
+        // but for half the interval's width times the variation.
+        let moved = chosen.color.map(|c| variation(&cubic::restrict(&c, 0.5 * (a + b), 0.5 * width)));
+        self.add_error((self.t[1] - self.t[0]) * moved.into_iter().fold(0.0, f64::max));
+        self.jump(at(b));
         true
     }
 

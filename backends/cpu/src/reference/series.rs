@@ -61,10 +61,10 @@ impl Term {
         }
         let growth = growth * (1.0 + 4.0 * EPS);
         let least = rest * (1.0 - (a + b + c));
-        let usable = rest > 0.0 && growth < 0.6 && opacity_error < 0.05 * least;
-        // |ln(1 − e/Q)| ≤ 1.03·e/Q for e/Q < 0.05; roundings of Q in proportion to what differs from 1.
+        let usable = rest > 0.0 && growth < 0.6 && opacity_error < 0.4 * least;
+        // |ln(1 − e/Q)| ≤ 1.28·e/Q for e/Q < 0.4; roundings of Q in proportion to what differs from 1.
         let round = 16.0 * EPS * (opacity.abs().min(1.0) + a + b + c) / (1.0 - (a + b + c)).max(0.01);
-        let error = 2.0 * kappa * (1.06 * opacity_error / least + round);
+        let error = 2.0 * kappa * (1.3 * opacity_error / least + round);
         let log = if opacity < 0.5 { -(-opacity).ln_1p() } else { -rest.ln() };
         usable.then_some(Self { kappa, log, ratio, growth, error, color })
     }

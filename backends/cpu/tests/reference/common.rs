@@ -132,8 +132,14 @@ fn cuts(value: &impl Fn(f64) -> f64, points: &[ControlPoint]) -> Vec<f64> {
             cuts.push(hi);
             a = hi;
         }
+        // Next to an extremum the value may come near to a pole of the logarithm.
+        let h = 1.0 / steps as f64;
+        if i > 0 && (value(a + h) - value(a)) * (value(a) - value(a - h)) < 0.0 {
+            cuts.push(a);
+        }
     }
     cuts.push(1.0);
+    cuts.sort_by(f64::total_cmp);
     cuts
 }
 
@@ -170,7 +176,7 @@ impl Truth {
             return false;
         }
         let (nodes, matrix, weights) = collocation();
-        let (panels, reach) = (64, 3.7);
+        let (panels, reach) = (192, 3.7);
         let h = 2.0 * reach / panels as f64;
         for panel in 0..panels {
             let sample = |node: f64| {

@@ -25,7 +25,7 @@ proptest! {
         from in prop::array::uniform2(0.02..0.98f64),
         to in prop::array::uniform2(0.02..0.98f64),
         points in tables(),
-        unit in 0.05..5.0f64,
+        unit in 0.2..5.0f64,
     ) {
         let (a, b) = (DVec3::new(from[0], from[1], 0.0), DVec3::new(to[0], to[1], 1.0));
         let expected =
