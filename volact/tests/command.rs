@@ -198,7 +198,7 @@ fn completions_know_the_commands() {
     let folder = tempfile::tempdir().unwrap();
     for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
         let script = volact(folder.path(), &["completions", shell]);
-        assert!(code(&script) == 0 && out(&script).contains("--straight-alpha"), "{shell}");
+        assert!(code(&script) == 0 && out(&script).contains("straight-alpha"), "{shell}");
     }
 }
 
