@@ -13,7 +13,7 @@ use commands::Command;
 
 /// Draw volumes: describe once, draw with any action.
 #[derive(Parser)]
-#[command(name = "volact", version, about, long_about = None, max_term_width = 100)]
+#[command(name = "volact", version, about = "Draw volumes: describe once, draw with any action", max_term_width = 100)]
 #[command(after_help = "Exit codes: 0 fine, 1 pictures differ, 2 failed.\n\
     VOLACT_LOG sets what is logged (e.g. `debug` or `volact_cpu=trace`), VOLACT_CONFIG names the config file.")]
 struct Cli {
