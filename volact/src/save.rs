@@ -35,7 +35,7 @@ pub enum SaveError {
         /// The file.
         path: PathBuf,
         /// Why.
-        source: LoadError,
+        source: Box<LoadError>,
     },
 }
 
@@ -86,6 +86,6 @@ impl FrameExt for Frame {
             PictureFormat::Exr => picture::save_exr(path, self),
             PictureFormat::Npy => picture::save_npy(path, self),
         };
-        written.map_err(|source| SaveError::Write { path: path.into(), source })
+        written.map_err(|source| SaveError::Write { path: path.into(), source: Box::new(source) })
     }
 }
