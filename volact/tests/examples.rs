@@ -4,7 +4,7 @@
 //! - Each scene, drawn by `cpu` as it stands, is its stored picture within a step of 8 bits: the
 //!   picture shows what a user gets.
 //! - That `cpu` is right is not proved by a picture of its own making: each scene is drawn small
-//!   by `cpu` and by `reference`, too.
+//!   by `cpu` and by `reference`, too, and with a fine step the two agree.
 
 use std::{
     fs,
@@ -49,8 +49,8 @@ fn open(name: &str, registry: &Registry) -> Scene {
     Scene::open(&path, registry, &NoProgress).unwrap_or_else(|e| panic!("{name}: {e}"))
 }
 
-fn draw(scene: &Scene, action: &str, registry: &Registry) -> Frame {
-    let mut action = registry.action(action, &Options::new()).unwrap();
+fn draw(scene: &Scene, action: &str, options: Options, registry: &Registry) -> Frame {
+    let mut action = registry.action(action, &options).unwrap();
     scene.shapes.iter().for_each(|shape| action.manage(shape).unwrap());
     action.begin_draw(&scene.frame).unwrap();
     scene.shapes.iter().for_each(|shape| action.draw(shape).unwrap());
@@ -73,7 +73,7 @@ fn data_are_by_rule() {
 fn pictures_are_what_a_user_gets() {
     let registry = volact::with_builtins();
     for name in SCENES {
-        let frame = draw(&open(name, &registry), "cpu", &registry);
+        let frame = draw(&open(name, &registry), "cpu", Options::new(), &registry);
         let fresh = frame.over_background();
         let stored = picture::load_picture(&picture_of(name)).unwrap();
         let (a, b) = (&stored.rgba, &fresh);
@@ -86,19 +86,24 @@ fn pictures_are_what_a_user_gets() {
     }
 }
 
+/// At the step that a user gets unless told, the thin band of `signal` is off by 0.16 at its rim;
+/// the others by 0.02 at most. At a 32nd of the unit distance all are within 0.001 of the truth
+/// (measured on AVX-512, November 2026): what is left shrinks with the square of the step.
 #[test]
 fn pictures_are_right() {
     let registry = volact::with_builtins();
     for name in SCENES {
         let mut scene = open(name, &registry);
-        let (width, height) = (scene.frame.width, scene.frame.height);
-        (scene.frame.width, scene.frame.height) = (16, 16 * height / width);
-        let [cpu, truth] = ["cpu", "reference"].map(|action| draw(&scene, action, &registry));
-        let image = |frame: &Frame| frame.color.clone();
-        let (a, b) = (image(&cpu), image(&truth));
-        let sized = |rgba| Image { width: cpu.width, height: cpu.height, rgba };
-        let found = metrics::compare(&sized(&a), &sized(&b)).unwrap();
-        assert!(found.max < 0.02 && found.rmse < 0.004, "{name}: max {}, rmse {}", found.max, found.rmse);
+        (scene.frame.width, scene.frame.height) = (16, 13);
+        let truth = draw(&scene, "reference", Options::new(), &registry).color;
+        let unit = scene.shapes[0].state().parameters["unit_distance"].as_float().unwrap();
+        let fine = Options::from([("sample_distance".to_owned(), (unit / 32.0).into())]);
+        for (options, max, rmse) in [(Options::new(), 0.25, 0.02), (fine, 0.002, 0.0002)] {
+            let drawn = draw(&scene, "cpu", options, &registry).color;
+            let image = |rgba| Image { width: 16, height: 13, rgba };
+            let found = metrics::compare(&image(&drawn), &image(&truth)).unwrap();
+            assert!(found.max < max && found.rmse < rmse, "{name}: max {}, rmse {}", found.max, found.rmse);
+        }
     }
 }
 
