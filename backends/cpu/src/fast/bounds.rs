@@ -49,7 +49,7 @@ impl ValueBounds {
         let slab = blocks[0] * blocks[1];
         let float = voxels.scalar.is_float();
         // One more, so that four bytes can be read at the last.
-        let mut quantised = vec![[255u8, 0]; slab * blocks[2] + 1];
+        let quantised = vec![[255u8, 0]; slab * blocks[2] + 1];
         let coarse_blocks = blocks.map(|n| n.div_ceil(COARSE));
         let coarse = vec![[255u8, 0]; coarse_blocks.iter().product::<usize>() + 1];
         let mut bounds = Self { blocks, range: None, quantised, coarse_blocks, coarse, float };
@@ -219,9 +219,12 @@ fn bound_layer(voxels: &Voxels<'_>, blocks: [usize; 3], bz: usize, [lo, hi]: [f3
     let scale = if hi > lo { 255.0 / (f64::from(hi) - f64::from(lo)) } else { 0.0 };
     for (q, [a, b]) in layer.iter_mut().zip(raw) {
         if a <= b {
-            // A little wider than exact, so that rounding here or in an interpolation is inside.
+            // A little wider than exact, so that rounding here or in an interpolation is inside;
+            // the ends of the range are exact, and empty air is known as such.
             let steps = |v: f32| (f64::from(v) - f64::from(lo)) * scale;
-            *q = [(steps(a) - 1e-4).floor().max(0.0) as u8, (steps(b) + 1e-4).ceil().min(255.0) as u8];
+            let low = if a >= hi { 255.0 } else { (steps(a) - 1e-4).floor().max(0.0) };
+            let high = if b <= lo { 0.0 } else { (steps(b) + 1e-4).ceil().min(255.0) };
+            *q = [low as u8, high as u8];
         }
     }
 }

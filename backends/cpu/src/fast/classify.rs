@@ -47,6 +47,8 @@ pub struct SegmentTable {
     pub scale: f32,
     /// See `scale`.
     pub offset: f32,
+    /// Node coordinates below this are exactly transparent.
+    pub dark: f32,
     /// Largest interpolation error found, in premultiplied colour or opacity.
     pub error: f64,
     /// First and last number on the grid.
@@ -90,7 +92,9 @@ impl SegmentTable {
         let mut entries: Vec<_> = nodes.iter().map(|e| e.map(|v| v as f32)).collect();
         entries.extend([entries[count - 1], [0.0; 4], [0.0; 4]]);
         let offset = (-domain[0] * scale) as f32;
-        Self { entries, nodes: count, scale: scale as f32, offset, error, domain, seen }
+        let first = entries.iter().take(count).position(|e| e[3] > 0.0).unwrap_or(count + 1);
+        let dark = first as f32 - 1.0;
+        Self { entries, nodes: count, scale: scale as f32, offset, dark, error, domain, seen }
     }
 
     /// Bytes held.

@@ -93,9 +93,9 @@ macro_rules! for_unit {
 }
 
 #[cfg(target_arch = "x86_64")]
-for_unit!(over_avx512, reduce_avx512, super::simd::Avx512, "avx512f,avx512bw,avx512dq,avx512vl");
+for_unit!(over_avx512, reduce_avx512, super::simd::Avx512, "avx512f,avx512bw,avx512dq,avx512vl,avx2,fma");
 #[cfg(target_arch = "x86_64")]
-for_unit!(over_avx2, reduce_avx2, super::simd::Avx2, "avx2");
+for_unit!(over_avx2, reduce_avx2, super::simd::Avx2, "avx2,fma");
 for_unit!(over_plain, reduce_plain, Plain);
 
 /// Draws a packet of an `over` shape; `None` where no ray meets it.

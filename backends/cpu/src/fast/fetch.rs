@@ -8,7 +8,7 @@
 
 use volact_core::{Filter, ScalarType, VolumeTexture};
 
-use super::simd::{LANES, Simd};
+use super::simd::{LANES, Simd, fused};
 
 /// What kernels know of a volume's voxels. Offsets are in voxels of one component.
 #[derive(Clone, Copy, Debug)]
@@ -33,6 +33,8 @@ pub struct Voxels<'a> {
     pub origin: f64,
     /// See `origin`.
     pub gain: f64,
+    /// Whether offsets between any two voxels are exact in f32: at most 2²⁴ voxels.
+    pub small: bool,
 }
 
 /// How voxels can be read.
@@ -67,6 +69,7 @@ impl<'a> Voxels<'a> {
             nearest: texture.filter() == Filter::Nearest,
             origin: 0.0,
             gain: 1.0,
+            small: volume.dims().iter().product::<usize>() <= 1 << 24,
         }
     }
 
@@ -128,12 +131,12 @@ pub trait Fetch: 'static {
 
 /// Cell and fraction along one axis.
 #[inline(always)]
-unsafe fn cell<S: Simd>(p: S::F, lo: f32, hi: f32) -> (S::I, S::F) {
+unsafe fn cell<S: Simd>(p: S::F, lo: f32, hi: f32) -> (S::F, S::F) {
     // SAFETY: the caller keeps the unit's contract.
     unsafe {
         let x = S::min(S::max(p, S::splat(lo)), S::splat(hi));
         let whole = S::min(S::floor(x), S::splat((hi - 1.0).max(lo)));
-        (S::to_int(whole), S::sub(x, whole))
+        (whole, S::sub(x, whole))
     }
 }
 
@@ -141,7 +144,7 @@ unsafe fn cell<S: Simd>(p: S::F, lo: f32, hi: f32) -> (S::I, S::F) {
 #[inline(always)]
 unsafe fn lerp<S: Simd>(a: S::F, b: S::F, t: S::F) -> S::F {
     // SAFETY: the caller keeps the unit's contract.
-    unsafe { S::add(a, S::mul(t, S::sub(b, a))) }
+    unsafe { S::fma(t, S::sub(b, a), a) }
 }
 
 /// As `lerp`, but `a` alone where `t` is 0: a NaN without weight does not count.
@@ -161,10 +164,23 @@ unsafe fn rows<S: Simd>(voxels: &Voxels<'_>, base: &Base, p: [S::F; 3], size: i3
         let (z, fz) = cell::<S>(p[2], base.lo[2], base.hi[2]);
         let row = (voxels.dims[0] as i32).wrapping_mul(size);
         let slab = row.wrapping_mul(voxels.dims[1] as i32);
-        let start = S::add_int(
-            S::mul_int(x, S::splat_int(size)),
-            S::add_int(S::mul_int(y, S::splat_int(row)), S::mul_int(z, S::splat_int(slab))),
-        );
+        let start = if voxels.small {
+            // Offsets in voxels stay below 2²⁴: exact in f32, and cheaper than integer products.
+            let row = S::splat(voxels.dims[0] as f32);
+            let slab = S::splat((voxels.dims[0] * voxels.dims[1]) as f32);
+            let start = S::to_int(S::fma(z, slab, S::fma(y, row, x)));
+            match size {
+                1 => start,
+                2 => S::shl::<1>(start),
+                _ => S::shl::<2>(start),
+            }
+        } else {
+            let (x, y, z) = (S::to_int(x), S::to_int(y), S::to_int(z));
+            S::add_int(
+                S::mul_int(x, S::splat_int(size)),
+                S::add_int(S::mul_int(y, S::splat_int(row)), S::mul_int(z, S::splat_int(slab))),
+            )
+        };
         let dy = S::splat_int(if voxels.max[1] > voxels.min[1] { row } else { 0 });
         let dz = S::splat_int(if voxels.max[2] > voxels.min[2] { slab } else { 0 });
         let next = S::add_int(start, dz);
@@ -307,7 +323,7 @@ fn scattered(voxels: &Voxels<'_>, base: &Base, local: [f32; 3]) -> f32 {
     if voxels.nearest {
         return voxels.at(i[0], i[1], i[2]);
     }
-    let mix = |a: f32, b: f32, t: f32| if t == 0.0 { a } else { a + t * (b - a) };
+    let mix = |a: f32, b: f32, t: f32| if t == 0.0 { a } else { fused(t, b - a, a) };
     let line = |y, z| mix(voxels.at(i[0], y, z), voxels.at(i[0] + step[0], y, z), f[0]);
     let plane = |z| mix(line(i[1], z), line(i[1] + step[1], z), f[1]);
     mix(plane(i[2]), plane(i[2] + step[2]), f[2])

@@ -13,7 +13,7 @@ use super::{
     packet::Packet,
     preintegrate::SegmentPairs,
     simd::{LANES, Simd},
-    walk::{CHUNK, Counts, Kernel, around, walk},
+    walk::{ALL, CHUNK, Counts, Kernel, around, walk},
 };
 
 /// One shape to draw.
@@ -323,6 +323,12 @@ impl<S: Simd> Kernel<S> for SampleKernel<'_, S> {
     unsafe fn take(&mut self, value: S::F, live: u32, row: usize) {
         // SAFETY: the caller's promises.
         unsafe {
+            let table = self.shared.job.table;
+            // Below the first node that can be seen everything is exactly zero.
+            let number = S::fma(value, S::splat(table.scale), S::splat(table.offset));
+            if S::lt_bits(number, S::splat(table.dark)) | !live & ALL == ALL {
+                return;
+            }
             (self.index[self.rows], self.fraction[self.rows]) = slots::<S>(self.shared.job, value, live);
         }
         self.row_of[self.rows] = row as u8;
@@ -365,7 +371,7 @@ impl<S: Simd> Kernel<S> for SampleKernel<'_, S> {
 unsafe fn node<S: Simd>(value: S::F, scale: f32, offset: f32, nodes: usize) -> (S::I, S::F) {
     // SAFETY: the caller's promises.
     unsafe {
-        let u = S::add(S::mul(value, S::splat(scale)), S::splat(offset));
+        let u = S::fma(value, S::splat(scale), S::splat(offset));
         let u = S::min(S::max(u, S::splat(0.0)), S::splat((nodes - 1) as f32));
         let i = S::to_int(u);
         (i, S::sub(u, S::to_float(i)))

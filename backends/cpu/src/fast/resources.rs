@@ -230,8 +230,8 @@ impl Resources {
                 Classification::PreIntegrated => true,
                 Classification::Auto => {
                     let estimate = sharp();
-                    log::debug!("{}: estimated error of post-classification {estimate:.2e}", shape.name);
-                    sharp::too_sharp(estimate)
+                    log::debug!("{}: estimated errors by classification {estimate:?}", shape.name);
+                    estimate.too_sharp()
                 }
             };
         let pairs = pre.then(|| {

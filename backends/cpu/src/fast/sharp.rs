@@ -1,9 +1,9 @@
 //! Whether a table is too sharp for a sample distance and the data.
 //!
-//! At fixed places of the volume, the opacity and colour that a segment gets from the value in its
-//! middle are compared with those of the value running linearly between its ends. The places and
-//! directions depend on nothing but the data ROI, so that the answer does not flicker while the
-//! camera moves.
+//! At fixed places of the volume, what a segment adds by the value in its middle, and by values
+//! running linearly between its ends, is compared with what it adds by the values along it. The
+//! places and directions depend on nothing but the data ROI, so that the answer does not flicker
+//! while the camera moves.
 
 use volact_core::{glam::DVec3, table::ResolvedTable};
 
@@ -12,13 +12,31 @@ use super::{
     fetch::Voxels,
 };
 
+/// Parts of a segment.
+const PARTS: usize = 12;
 /// Places looked at.
-const PLACES: usize = 4096;
+const PLACES: usize = 2048;
 /// Error of a pixel, as estimated, from which a shape is pre-integrated: a quarter of an 8-bit step.
 const LIMIT: f64 = 0.25 / 255.0;
 
-/// Estimates the error of a pixel from classifying at the middle of segments: the mean error of a
-/// segment that can be seen adds up along a ray, the scatter by the square root.
+/// Estimated errors of a pixel.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Estimate {
+    /// Classified in the middle of segments.
+    pub post: f64,
+    /// Pre-integrated.
+    pub pre: f64,
+}
+
+impl Estimate {
+    /// Whether to pre-integrate: where it matters, and helps.
+    pub fn too_sharp(self) -> bool {
+        self.post > LIMIT && self.pre < 0.8 * self.post
+    }
+}
+
+/// Estimates the errors for segments of `h` unit distances and `step` samples along each axis.
+/// Errors of segments are taken as independent: they add up along a ray by the square root.
 pub fn estimate(
     voxels: &Voxels<'_>,
     table: &ResolvedTable,
@@ -26,10 +44,10 @@ pub fn estimate(
     units: Units,
     h: f64,
     step: DVec3,
-) -> f64 {
+) -> Estimate {
     let size: [f64; 3] = std::array::from_fn(|a| (voxels.max[a] - voxels.min[a]) as f64);
     let mut seen = 0usize;
-    let (mut square, mut visible_depth) = (0f64, 0f64);
+    let (mut post, mut pre, mut opacity) = (0f64, 0f64, 0f64);
     for n in 0..PLACES {
         // Additive recurrence with the plastic number in three dimensions (Roberts 2018).
         let at = |a: usize, g: f64| voxels.min[a] as f64 + (0.5 + g * (n + 1) as f64).fract() * size[a];
@@ -37,47 +55,46 @@ pub fn estimate(
         let mut half = [0f64; 3];
         half[n % 3] = 0.5 * step[n % 3];
         let value = |s: f64| plain(voxels, std::array::from_fn(|a| p[a] + s * half[a]));
+        let part = |i: usize| 2.0 * (i as f64 + 0.5) / PARTS as f64 - 1.0;
+        let along: [f32; PARTS] = std::array::from_fn(|i| value(part(i)));
         let (front, middle, back) = (value(-1.0), value(0.0), value(1.0));
-        if [front, middle, back].iter().any(|v| v.is_nan())
-            || !fine.sees(front.min(back).min(middle), front.max(back).max(middle))
-        {
+        let all = || along.iter().copied().chain([front, middle, back]);
+        let (lo, hi) = (all().fold(f32::INFINITY, f32::min), all().fold(f32::NEG_INFINITY, f32::max));
+        if all().any(f32::is_nan) || !fine.sees(lo, hi) {
             continue;
         }
-        let post = segment(table.classify(units.data(f64::from(middle))), h);
-        let exact = integrated(table, units, f64::from(front), f64::from(back), h);
-        let error = (0..4).map(|c| (post[c] - exact[c]).powi(2)).fold(0.0, f64::max);
-        square += error;
-        visible_depth += exact[3];
+        let classify = |v: f64| table.classify(units.data(v));
+        let exact = composite(|i| classify(f64::from(along[i])), h);
+        let (front, back) = (f64::from(front), f64::from(back));
+        let linear = composite(|i| classify(0.5 * (front + back) + 0.5 * part(i) * (back - front)), h);
+        let whole = segment(classify(f64::from(middle)), h);
+        let error = |e: [f64; 4]| (0..4).map(|c| (e[c] - exact[c]).powi(2)).fold(0.0, f64::max);
+        post += error(whole);
+        pre += error(linear);
+        opacity += exact[3];
         seen += 1;
     }
     if seen == 0 {
-        return 0.0;
+        return Estimate::default();
     }
-    let rms = (square / seen as f64).sqrt();
-    let mean_alpha = visible_depth / seen as f64;
     // As many segments of a ray as can be seen: those in the volume, but no more than are before
     // it is opaque.
     let along = size.iter().zip(step.to_array()).map(|(n, s)| n / s.max(1e-9)).fold(0.0, f64::max);
-    let count = (along * seen as f64 / PLACES as f64).min(1.0 / mean_alpha.max(1e-9)).max(1.0);
-    rms * count.sqrt()
+    let opaque = seen as f64 / opacity.max(1e-9);
+    let count = (along * seen as f64 / PLACES as f64).min(opaque).max(1.0);
+    let pixel = |square: f64| (square / seen as f64 * count).sqrt();
+    Estimate { post: pixel(post), pre: pixel(pre) }
 }
 
-/// A segment of linearly running value, by sixteen equal parts.
-fn integrated(table: &ResolvedTable, units: Units, front: f64, back: f64, h: f64) -> [f64; 4] {
-    const PARTS: usize = 16;
+/// A segment of equal parts, each with its colour and opacity.
+fn composite(classify: impl Fn(usize) -> [f64; 4], h: f64) -> [f64; 4] {
     let mut out = [0f64; 4];
     for i in 0..PARTS {
-        let v = front + (back - front) * (i as f64 + 0.5) / PARTS as f64;
-        let add = segment(table.classify(units.data(v)), h / PARTS as f64);
+        let add = segment(classify(i), h / PARTS as f64);
         let left = 1.0 - out[3];
         out = std::array::from_fn(|c| out[c] + left * add[c]);
     }
     out
-}
-
-/// Whether to pre-integrate for that estimate.
-pub fn too_sharp(estimate: f64) -> bool {
-    estimate > LIMIT
 }
 
 /// Trilinear interpolation at sample coordinates.

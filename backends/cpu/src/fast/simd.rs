@@ -1,9 +1,9 @@
 //! Vectors of sixteen lanes, one lane a ray.
 //!
 //! [`Simd`] is what the kernels are written in; [`Avx512`], [`Avx2`] and [`Plain`] do the same
-//! arithmetic in the same order, without fused multiply-add, so that the vector unit changes the
-//! speed and not one bit of the picture. `Plain` is arrays that the compiler vectorises for the
-//! target's baseline: SSE2 on x86-64, NEON on aarch64.
+//! arithmetic in the same order. `Plain` is arrays that the compiler vectorises for the target's
+//! baseline: SSE2 on x86-64, NEON on aarch64. Units with fused multiply-add give the same bits;
+//! plain x86-64, which has none, differs by rounding.
 #![expect(unsafe_code, reason = "vector intrinsics and gathers")]
 
 /// Lanes of a vector.
@@ -28,7 +28,7 @@ impl Unit {
             if ["avx512f", "avx512bw", "avx512dq", "avx512vl"].iter().all(|f| has(f)) {
                 return Self::Avx512;
             }
-            if has("avx2") {
+            if has("avx2") && has("fma") {
                 return Self::Avx2;
             }
         }
@@ -61,6 +61,7 @@ fn has(feature: &str) -> bool {
         "avx512bw" => is_x86_feature_detected!("avx512bw"),
         "avx512dq" => is_x86_feature_detected!("avx512dq"),
         "avx512vl" => is_x86_feature_detected!("avx512vl"),
+        "fma" => is_x86_feature_detected!("fma"),
         _ => is_x86_feature_detected!("avx2"),
     }
 }
@@ -88,6 +89,8 @@ pub trait Simd: Copy + 'static {
     unsafe fn sub(a: Self::F, b: Self::F) -> Self::F;
     /// a · b.
     unsafe fn mul(a: Self::F, b: Self::F) -> Self::F;
+    /// a · b + c, rounded once (twice on plain x86-64).
+    unsafe fn fma(a: Self::F, b: Self::F, c: Self::F) -> Self::F;
     /// The smaller; `b` where `a` is NaN.
     unsafe fn min(a: Self::F, b: Self::F) -> Self::F;
     /// The larger; `b` where `a` is NaN.
@@ -161,18 +164,25 @@ pub trait Simd: Copy + 'static {
     ) -> Self::Quads;
 }
 
-/// `under` of one lane.
+/// a · b + c, fused where the target has that.
 #[inline(always)]
-unsafe fn under_lane(c: [f32; 4], table: *const u8, index: i32, fraction: f32) -> [f32; 4] {
+pub fn fused(a: f32, b: f32, c: f32) -> f32 {
+    if cfg!(any(target_feature = "fma", target_arch = "aarch64")) { a.mul_add(b, c) } else { a * b + c }
+}
+
+/// `under` of one lane, with a unit's multiply-add.
+#[inline(always)]
+unsafe fn under_lane(fma: impl Fn(f32, f32, f32) -> f32, c: [f32; 4], table: *const u8, index: i32, fraction: f32) -> [f32; 4] {
     // SAFETY: the caller's indices lie inside the table, which has an entry after each.
     let [a, b] = unsafe { table.offset(index as isize).cast::<[[f32; 4]; 2]>().read_unaligned() };
     let left = 1.0 - c[3];
-    [0, 1, 2, 3].map(|i| c[i] + left * (a[i] + fraction * (b[i] - a[i])))
+    [0, 1, 2, 3].map(|i| fma(left, fma(fraction, b[i] - a[i], a[i]), c[i]))
 }
 
 /// `under_pairs` of one lane.
 #[inline(always)]
 unsafe fn under_pairs_lane(
+    fma: impl Fn(f32, f32, f32) -> f32,
     c: [f32; 4],
     table: *const u8,
     stride: usize,
@@ -187,13 +197,13 @@ unsafe fn under_pairs_lane(
     };
     let left = 1.0 - c[3];
     [0, 1, 2, 3].map(|i| {
-        let (x, y) = (a[i] + back * (b[i] - a[i]), p[i] + back * (q[i] - p[i]));
-        c[i] + left * (x + front * (y - x))
+        let (x, y) = (fma(back, b[i] - a[i], a[i]), fma(back, q[i] - p[i], p[i]));
+        fma(left, fma(front, y - x, x), c[i])
     })
 }
 
 macro_rules! quads_by_lane {
-    () => {
+    ($fma:expr) => {
         type Quads = [[f32; 4]; LANES];
         #[inline(always)]
         unsafe fn load_quads(v: &[[f32; 4]; LANES]) -> Self::Quads {
@@ -212,7 +222,7 @@ macro_rules! quads_by_lane {
         ) -> Self::Quads {
             for l in 0..LANES {
                 // SAFETY: the caller's.
-                c[l] = unsafe { super_under(c[l], table, index[l], fraction[l]) };
+                c[l] = unsafe { super_under($fma, c[l], table, index[l], fraction[l]) };
             }
             c
         }
@@ -227,7 +237,7 @@ macro_rules! quads_by_lane {
         ) -> Self::Quads {
             for l in 0..LANES {
                 // SAFETY: the caller's.
-                c[l] = unsafe { super_under_pairs(c[l], table, stride, index[l], [front[l], back[l]]) };
+                c[l] = unsafe { super_under_pairs($fma, c[l], table, stride, index[l], [front[l], back[l]]) };
             }
             c
         }
@@ -277,6 +287,10 @@ impl Simd for Plain {
     #[inline(always)]
     unsafe fn mul(a: Self::F, b: Self::F) -> Self::F {
         lanes!(|i| a[i] * b[i])
+    }
+    #[inline(always)]
+    unsafe fn fma(a: Self::F, b: Self::F, c: Self::F) -> Self::F {
+        lanes!(|i| fused(a[i], b[i], c[i]))
     }
     #[inline(always)]
     unsafe fn min(a: Self::F, b: Self::F) -> Self::F {
@@ -383,7 +397,7 @@ impl Simd for Plain {
         lanes!(|i| unsafe { base.offset(offset[i] as isize).cast::<i32>().read_unaligned() })
     }
 
-    quads_by_lane!();
+    quads_by_lane!(fused);
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -421,6 +435,7 @@ mod x86 {
             fn add(a: __m512, b: __m512) -> __m512 { _mm512_add_ps(a, b) }
             fn sub(a: __m512, b: __m512) -> __m512 { _mm512_sub_ps(a, b) }
             fn mul(a: __m512, b: __m512) -> __m512 { _mm512_mul_ps(a, b) }
+            fn fma(a: __m512, b: __m512, c: __m512) -> __m512 { _mm512_fmadd_ps(a, b, c) }
             fn min(a: __m512, b: __m512) -> __m512 { _mm512_min_ps(a, b) }
             fn max(a: __m512, b: __m512) -> __m512 { _mm512_max_ps(a, b) }
             fn where_zero(t: __m512, a: __m512, b: __m512) -> __m512 {
@@ -542,7 +557,7 @@ mod x86 {
     #[inline(always)]
     unsafe fn mix(a: __m512, b: __m512, t: __m512) -> __m512 {
         // SAFETY: AVX-512 as above.
-        unsafe { _mm512_add_ps(a, _mm512_mul_ps(t, _mm512_sub_ps(b, a))) }
+        unsafe { _mm512_fmadd_ps(t, _mm512_sub_ps(b, a), a) }
     }
 
     /// c + (1 − c.a)·e.
@@ -552,7 +567,7 @@ mod x86 {
         unsafe {
             let alpha = _mm512_permute_ps::<0xff>(c);
             let left = _mm512_sub_ps(_mm512_set1_ps(1.0), alpha);
-            _mm512_add_ps(c, _mm512_mul_ps(left, e))
+            _mm512_fmadd_ps(left, e, c)
         }
     }
 
@@ -616,6 +631,10 @@ mod x86 {
         #[inline(always)]
         unsafe fn mul(a: Self::F, b: Self::F) -> Self::F {
             both!(|a, b| _mm256_mul_ps(a, b))
+        }
+        #[inline(always)]
+        unsafe fn fma(a: Self::F, b: Self::F, c: Self::F) -> Self::F {
+            both!(|a, b, c| _mm256_fmadd_ps(a, b, c))
         }
         #[inline(always)]
         unsafe fn min(a: Self::F, b: Self::F) -> Self::F {
@@ -734,6 +753,6 @@ mod x86 {
             both!(|offset| _mm256_i32gather_epi32::<1>(base.cast(), offset))
         }
 
-        quads_by_lane!();
+        quads_by_lane!(|a, b, c| f32::mul_add(a, b, c));
     }
 }

@@ -218,7 +218,7 @@ impl<S: Simd> Rows<S> {
         unsafe {
             let r = S::splat(row);
             let (p, d) = (self.position, self.advance);
-            [S::add(p[0], S::mul(r, d[0])), S::add(p[1], S::mul(r, d[1])), S::add(p[2], S::mul(r, d[2]))]
+            [S::fma(r, d[0], p[0]), S::fma(r, d[1], p[1]), S::fma(r, d[2], p[2])]
         }
     }
 
