@@ -248,7 +248,7 @@ fn distinct_color(index: usize) -> [f64; 3] {
 }
 
 /// Looks along the axis in which a flat subject is thin, else from in front, the right and above;
-/// and at the box that holds the subject.
+/// at patients (values in HU) straight from in front. And at the box that holds the subject.
 fn choose_view(volume: &Volume, statistics: &Statistics, inside: impl Fn(f64) -> bool) -> (View, Aabb) {
     let Some(extent) = statistics.extent(inside) else { return (View::Iso, whole(volume)) };
     let subject = world_box(volume, extent.map(|range| range.map(|i| i * statistics.stride)), 2 * statistics.stride);
@@ -258,7 +258,7 @@ fn choose_view(volume: &Volume, statistics: &Statistics, inside: impl Fn(f64) ->
     let thin = (0..3).min_by(|a, b| size[*a].total_cmp(&size[*b])).unwrap_or(2);
     let others = (0..3).filter(|a| *a != thin).map(|a| size[a]).fold(f64::INFINITY, f64::min);
     if size[thin] > FLAT * others {
-        return (View::Iso, subject);
+        return (if volume.desc().unit == "HU" { View::Front } else { View::Iso }, subject);
     }
     let direction = steps[thin].normalize_or(DVec3::Z).abs();
     let views = [(View::Top, direction.z), (View::Front, direction.y), (View::Right, direction.x)];

@@ -113,6 +113,12 @@ fn flat_subjects_are_seen_along_their_thin_axis() {
 }
 
 #[test]
+fn patients_are_faced() {
+    let patient = VolumeDesc { unit: "HU".into(), ..desc(40) };
+    assert_eq!(automatic(&volume(patient, ball(40))).view, View::Front);
+}
+
+#[test]
 fn labels_get_a_colour_each_and_the_nearest_sample() {
     let label = |at: [usize; 3]| match radius(at, 40) {
         _ if at[0] > 35 && at[1] == 39 && at[2] == 0 => 31.0,
