@@ -68,9 +68,8 @@ impl PeerScene {
             "mip" => "mip",
             other => bail!("mode {other:?} is not drawn yet, wanted dvr or mip"),
         };
-        let appearance = Appearance::new(shader)
-            .with("lookup_table", self.table()?)
-            .with("unit_distance", self.tf.unit_distance);
+        let appearance =
+            Appearance::new(shader).with("lookup_table", self.table()?).with("unit_distance", self.tf.unit_distance);
         Ok(Shape::around(&volume, appearance))
     }
 
@@ -93,7 +92,8 @@ impl PeerScene {
             self.tf.color.iter().map(|c| c[0]).chain(self.tf.opacity.iter().map(|o| o[0])).collect();
         values.sort_by(f64::total_cmp);
         values.dedup();
-        let color: [Vec<[f64; 2]>; 3] = std::array::from_fn(|c| self.tf.color.iter().map(|r| [r[0], r[c + 1]]).collect());
+        let color: [Vec<[f64; 2]>; 3] =
+            std::array::from_fn(|c| self.tf.color.iter().map(|r| [r[0], r[c + 1]]).collect());
         let point = |&value: &f64| ControlPoint {
             value,
             color: [0, 1, 2].map(|c| interpolate(&color[c], value)),

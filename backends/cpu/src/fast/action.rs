@@ -362,12 +362,12 @@ impl<'a> Picture<'a> {
                 for pass in &self.passes {
                     self.pass(pass, [x, first + y], &mut pixels, &mut zero, counts);
                 }
-                for l in 0..LANES {
+                for (l, zero) in zero.into_iter().enumerate() {
                     let (px, py) = (x + l % SIDE, y + l / SIDE);
                     if px < self.viewport.width && py < rows {
                         let at = py * width + self.viewport.x + px;
                         color[at] = pixels.color[l];
-                        depth[at] = (pixels.depth[l] - zero[l]) as f32;
+                        depth[at] = (pixels.depth[l] - zero) as f32;
                     }
                 }
             }
@@ -392,7 +392,7 @@ impl<'a> Picture<'a> {
                 }
             }
             Pass::General { layers } => {
-                for l in 0..LANES {
+                for (l, zero) in zero.iter_mut().enumerate() {
                     let (x, y) = (at[0] + l % SIDE, at[1] + l / SIDE);
                     if x < size[0] && y < size[1] {
                         let ray = self.grid.ray(x as f64 + 0.5, y as f64 + 0.5);
@@ -400,7 +400,7 @@ impl<'a> Picture<'a> {
                         let result = general::draw(layers, &ray, &self.lattice, end, threshold, counts);
                         pixels.color[l] = result.color.map(|v| v as f32);
                         pixels.depth[l] = result.depth;
-                        zero[l] = ray.depth_zero;
+                        *zero = ray.depth_zero;
                     }
                 }
             }

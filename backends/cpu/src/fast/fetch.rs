@@ -123,6 +123,7 @@ impl Base {
 ///
 /// # Safety
 /// The unit's contract of [`Simd`]; `base` was made for `voxels`, whose access is the implementer's.
+#[expect(clippy::missing_safety_doc, reason = "the contract stands above")]
 pub trait Fetch: 'static {
     /// The values, in stored units (`Scattered`: after origin and gain). NaN where a NaN sample
     /// has weight.

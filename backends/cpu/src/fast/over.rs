@@ -3,6 +3,7 @@
 //! Whole segments are looked up in a table made for the sample distance; the cut segments at the
 //! ends of a ray's interval take the power of their true length.
 #![expect(unsafe_code, reason = "kernels of a vector unit")]
+#![expect(clippy::needless_range_loop, reason = "a lane indexes several arrays")]
 
 use volact_core::lattice::Lattice;
 
@@ -134,12 +135,7 @@ unsafe fn ends<S: Simd, F: Fetch>(
 
 /// The numbers at one `t` a lane.
 #[inline(always)]
-unsafe fn numbers<S: Simd, F: Fetch>(
-    job: &Job<'_>,
-    packet: &Packet,
-    lead: usize,
-    t: impl Fn(usize) -> f64,
-) -> S::F {
+unsafe fn numbers<S: Simd, F: Fetch>(job: &Job<'_>, packet: &Packet, lead: usize, t: impl Fn(usize) -> f64) -> S::F {
     let base = Base::new(&job.voxels, packet.at(lead, t(lead)));
     let mut p = [[0f32; LANES]; 3];
     for a in 0..3 {

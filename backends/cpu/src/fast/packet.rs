@@ -241,8 +241,7 @@ mod tests {
         let place = Place { to_object, to_index, block: Aabb::new(-DVec3::ONE, DVec3::ONE) };
         let viewport = Viewport { x: 0, y: 0, width: 9, height: 7 };
         let (eye, up) = (DVec3::new(1.0, -4.0, 2.0), DVec3::Z);
-        for camera in
-            [Camera::perspective(eye, DVec3::ZERO, up, 35.0), Camera::orthographic(eye, DVec3::ZERO, up, 3.0)]
+        for camera in [Camera::perspective(eye, DVec3::ZERO, up, 35.0), Camera::orthographic(eye, DVec3::ZERO, up, 3.0)]
         {
             let grid = camera.rays(&viewport).unwrap();
             for (x, y) in [(0, 0), (4, 0), (8, 4)] {

@@ -52,7 +52,7 @@ impl SegmentPairs {
     pub fn new(table: &ResolvedTable, units: Units, fine: &SegmentTable, h: f64, most: usize, threads: usize) -> Self {
         let all = fine.nodes - 1;
         // The finest grid that is a part of the fine one keeps its nodes on the control points.
-        let share = (1..=all.max(1)).find(|d| all % d == 0 && all / d < most && all / d >= most / 3);
+        let share = (1..=all.max(1)).find(|d| all.is_multiple_of(*d) && all / d < most && all / d >= most / 3);
         let intervals = share.map_or(all.min(most - 1), |d| all / d).max(1);
         let nodes = intervals + 1;
         let [lo, hi] = fine.domain;
@@ -169,9 +169,7 @@ fn pair(nodes: &[Node], diagonal: &[[f64; 4]], i: usize, j: usize, h: f64) -> [f
         let to = if j > i { i + (j - i) * p / pieces } else { i - (i - j) * p / pieces };
         let add = piece(&nodes[from], &nodes[to], per_node, j < i);
         let left = 1.0 - out[3];
-        for c in 0..4 {
-            out[c] += left * add[c];
-        }
+        out = std::array::from_fn(|c| out[c] + left * add[c]);
         from = to;
     }
     out
@@ -185,8 +183,7 @@ fn piece(a: &Node, b: &Node, per_node: f64, falling: bool) -> [f64; 4] {
     }
     let alpha = -(-depth).exp_m1();
     let (share, g) = (alpha / depth, moment_weight(depth));
-    let mut out = [0.0, 0.0, 0.0, alpha];
-    for c in 0..3 {
+    let color = |c: usize| {
         let k = per_node * (b.k[c] - a.k[c]).abs();
         let inner = if falling {
             a.sigma * (a.k[c] - b.k[c]) - (a.m[c] - b.m[c])
@@ -194,9 +191,9 @@ fn piece(a: &Node, b: &Node, per_node: f64, falling: bool) -> [f64; 4] {
             b.m[c] - a.m[c] - a.sigma * (b.k[c] - a.k[c])
         };
         let moment = per_node * per_node * inner;
-        out[c] = (k * share - (moment - 0.5 * k * depth) * g).max(0.0);
-    }
-    out
+        (k * share - (moment - 0.5 * k * depth) * g).max(0.0)
+    };
+    [color(0), color(1), color(2), alpha]
 }
 
 /// g(T), by its series near 0: 1 − T/2 + 3T²/20 − T³/30 + …

@@ -1,5 +1,6 @@
 //! Maximum, minimum and mean of the value along a ray's interval, sixteen rays at once.
 #![expect(unsafe_code, reason = "kernels of a vector unit")]
+#![expect(clippy::needless_range_loop, reason = "a lane indexes several arrays")]
 
 use volact_core::{Compositing, lattice::Lattice};
 

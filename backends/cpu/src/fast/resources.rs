@@ -28,6 +28,9 @@ struct BoundsKey {
     roi: [usize; 6],
 }
 
+/// What a shape's emptiness depends on: its table (0 for none), its data, and how it is composited.
+type EmptyKey = (u64, BoundsKey, u64);
+
 /// What a shape's tables depend on.
 #[derive(Clone, Debug, PartialEq)]
 struct TableKey {
@@ -58,7 +61,7 @@ pub struct Resources {
     bounds: BTreeMap<BoundsKey, Arc<ValueBounds>>,
     tables: BTreeMap<u64, Tables>,
     /// By shape: what it depends on, and what can be skipped.
-    empty: BTreeMap<u64, ((u64, BoundsKey, u64), Arc<Emptiness>)>,
+    empty: BTreeMap<u64, (EmptyKey, Arc<Emptiness>)>,
 }
 
 /// The component that a shape reads.
@@ -182,7 +185,7 @@ impl Resources {
         if compositing != Compositing::Over {
             if matches!(compositing, Compositing::Add | Compositing::Average) {
                 let zero = units.number(0.0) as f32;
-                let same = |k: &(u64, BoundsKey, u64)| *k == (0, key, 0);
+                let same = |k: &EmptyKey| *k == (0, key, 0);
                 match (&bounds, self.empty.get(&shape.id)) {
                     (Some(_), Some((k, _))) if same(k) => {}
                     (Some(bounds), _) if skips && zero == 0.0 => {

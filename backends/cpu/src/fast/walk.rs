@@ -5,6 +5,7 @@
 //! f64 at each, and rays end there and only there. So neither what is skipped nor how rays are
 //! grouped changes a bit of the picture.
 #![expect(unsafe_code, reason = "kernels of a vector unit")]
+#![expect(clippy::needless_range_loop, reason = "a lane indexes several arrays")]
 
 use super::{
     bounds::BLOCK,
@@ -46,6 +47,7 @@ impl Counts {
 ///
 /// # Safety
 /// Functions keep the contract of [`Simd`].
+#[expect(clippy::missing_safety_doc, reason = "the contract stands above")]
 pub trait Kernel<S: Simd> {
     /// Where in a segment its position lies: 0.5, or 0 where the kernel takes both ends.
     const AT: f64;
@@ -145,7 +147,7 @@ impl<S: Simd> Rows<S> {
                 let d = (packet.direction[a][l] * step) as f32;
                 let i = 1.0 / d;
                 advance[a][l] = d;
-                inverse[a][l] = if i > 1e30 { 1e30 } else if i < -1e30 { -1e30 } else { i };
+                inverse[a][l] = i.clamp(-1e30, 1e30);
             }
         }
         let mut from = [0f32; LANES];
@@ -179,14 +181,7 @@ impl<S: Simd> Rows<S> {
 
     /// Moves to the chunk that begins with segment `chunk`, `ahead` after the packet's first.
     #[inline(always)]
-    unsafe fn begin<K: Kernel<S>>(
-        &mut self,
-        voxels: &Voxels<'_>,
-        packet: &Packet,
-        step: f64,
-        chunk: i64,
-        ahead: i64,
-    ) {
+    unsafe fn begin<K: Kernel<S>>(&mut self, voxels: &Voxels<'_>, packet: &Packet, step: f64, chunk: i64, ahead: i64) {
         let t = (chunk as f64 + K::AT) * step;
         self.base = Base::new(voxels, packet.at(self.lead, t + 0.5 * CHUNK as f64 * step));
         let mut position = [[0f32; LANES]; 3];
