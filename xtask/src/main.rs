@@ -1,7 +1,9 @@
 //! What people who work on Volact repeat: `cargo xtask --help`.
 
+mod check;
 mod peer;
 mod peer_scene;
+mod peers;
 
 use clap::{Parser, Subcommand};
 
@@ -14,12 +16,21 @@ struct Args {
 
 #[derive(Subcommand)]
 enum Task {
+    /// Run the whole test suite.
+    Test,
+    /// Run the suite, the formatter, the linter and the documentation, as .ci/run does.
+    Check,
     /// Draw one scene of the peers' folder and print its row.
     Peer(peer::Args),
+    /// Compare with other renderers in one run, interleaved, and write the tables.
+    Peers(peers::Args),
 }
 
 fn main() -> anyhow::Result<()> {
     match Args::parse().task {
+        Task::Test => check::test(),
+        Task::Check => check::all(),
         Task::Peer(args) => peer::run(&args),
+        Task::Peers(args) => peers::run(&args),
     }
 }

@@ -1,0 +1,182 @@
+//! `cargo xtask peers`: other renderers on the same scenes against one ground truth, interleaved
+//! with Volact, by the driver of the peers' folder (`VOLACT_PEERS`).
+
+use std::{collections::BTreeMap, env, fmt::Write as _, fs, path::PathBuf, process::Command};
+
+use anyhow::{Context, Result, bail};
+use serde_json::Value;
+
+/// The scenes that are unlit.
+const SCENES: [&str; 4] = ["marschner_lobb_256_u8", "blob_cloud_256_u8", "ct_like_u16", "ct_mip_u16"];
+const BEGIN: &str = "<!-- peers: begin -->";
+const END: &str = "<!-- peers: end -->";
+
+/// Arguments of `peers`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// The python of the peers' virtual environment (its setup.sh makes it).
+    #[arg(long)]
+    python: PathBuf,
+    /// Only tables, from an earlier run's rows.
+    #[arg(long)]
+    tables: bool,
+    /// Where the rows go: a JSON line each.
+    #[arg(long, default_value = "target/peers.jsonl")]
+    log: PathBuf,
+    /// The document whose marked part is replaced.
+    #[arg(long, default_value = "docs/performance.md")]
+    report: PathBuf,
+    /// Rounds.
+    #[arg(long, default_value_t = 1)]
+    rounds: usize,
+}
+
+/// Runs the comparison and writes the tables.
+pub fn run(args: &Args) -> Result<()> {
+    if !args.tables {
+        measure(args)?;
+    }
+    let text = fs::read_to_string(&args.log).with_context(|| format!("{}: cannot be read", args.log.display()))?;
+    let rows: Vec<Value> = text.lines().filter_map(|l| serde_json::from_str(l).ok()).collect();
+    let tables = tables(&rows);
+    let document = fs::read_to_string(&args.report).unwrap_or_else(|_| format!("{BEGIN}\n{END}\n"));
+    let (Some(begin), Some(end)) = (document.find(BEGIN), document.find(END)) else {
+        bail!("{}: has no lines {BEGIN:?} and {END:?}", args.report.display());
+    };
+    let written = format!("{}{BEGIN}\n{tables}{}", &document[..begin], &document[end..]);
+    let temporary = args.report.with_extension("tmp");
+    fs::write(&temporary, written).with_context(|| format!("{}: cannot be written", temporary.display()))?;
+    fs::rename(&temporary, &args.report)?;
+    println!("{}: tables written", args.report.display());
+    Ok(())
+}
+
+fn measure(args: &Args) -> Result<()> {
+    let peers = env::var_os("VOLACT_PEERS").context("VOLACT_PEERS is not set: the folder of the peers' driver")?;
+    let own = env::current_exe()?;
+    let log = env::current_dir()?.join(&args.log);
+    if log.exists() {
+        fs::remove_file(&log)?;
+    }
+    let with = |name: &str, step: &str, more: &str| {
+        format!(
+            "{name}={} peer --scene {{scene}} --data {{data}} --view {{view}} --step {step} --size {{size}} --out {{out}}{more}",
+            own.display()
+        )
+    };
+    // Beside the same distance, one for each peer that another setting must answer.
+    let others = [
+        with("volact", "{step}", ""),
+        with("volact-post", "{step}", " --option classification=post"),
+        with("volact-pre", "{step}", " --option classification=pre-integrated"),
+        with("volact-1-thread", "{step}", " --option threads=1"),
+        with("volact-step-2", "2", ""),
+        with("volact-step-4", "4", ""),
+        with("volact-step-0.25", "0.25", ""),
+    ];
+    let mut command = Command::new(&args.python);
+    command.current_dir(&peers).arg("run_all.py").arg("--scenes").args(SCENES);
+    command.args(["--rounds", &args.rounds.to_string(), "--log"]).arg(&log).arg("--with").args(&others);
+    let status = command.status().with_context(|| format!("{}: cannot be run", args.python.display()))?;
+    if !status.success() {
+        bail!("the peers' driver failed: {status}");
+    }
+    Ok(())
+}
+
+/// One measurement: milliseconds and error.
+#[derive(Clone, Copy)]
+struct Point {
+    ms: f64,
+    rmse: f64,
+}
+
+type Key = (String, String, String);
+
+fn tables(rows: &[Value]) -> String {
+    let mut points: BTreeMap<Key, BTreeMap<String, Point>> = BTreeMap::new();
+    for row in rows {
+        let text = |k: &str| row[k].as_str().unwrap_or_default().to_owned();
+        let (Some(ms), Some(rmse)) = (row["ms"].as_f64(), row["rmse"].as_f64()) else { continue };
+        let key = (text("scene"), text("view"), format!("{}", row["step"].as_f64().unwrap_or(0.0)));
+        let place = points.entry(key).or_default().entry(text("peer")).or_insert(Point { ms, rmse });
+        if ms < place.ms {
+            *place = Point { ms, rmse };
+        }
+    }
+    let mut out = String::new();
+    same_distance(&points, &mut out);
+    dominated(&points, &mut out);
+    scaling(&points, &mut out);
+    out
+}
+
+fn own(name: &str) -> bool {
+    name.starts_with("volact")
+}
+
+fn same_distance(points: &BTreeMap<Key, BTreeMap<String, Point>>, out: &mut String) {
+    let _ = writeln!(
+        out,
+        "\n### At equal sample distance\n\nMilliseconds a frame / RMSE; how many times as fast as VTK's CPU mapper; the best peer's RMSE.\n"
+    );
+    let _ = writeln!(
+        out,
+        "| scene | view | distance | volact | vtk-cpu | times as fast | best peer's RMSE | volact no worse |\n|---|---|---|---|---|---|---|---|"
+    );
+    for ((scene, view, step), by_peer) in points {
+        let (Some(mine), Some(vtk)) = (by_peer.get("volact"), by_peer.get("vtk-cpu")) else { continue };
+        let best = by_peer.iter().filter(|(n, _)| !own(n)).min_by(|a, b| a.1.rmse.total_cmp(&b.1.rmse));
+        let (name, best) = best.map_or(("", f64::NAN), |(n, p)| (n.as_str(), p.rmse));
+        let _ = writeln!(
+            out,
+            "| {scene} | {view} | {step} | {:.0} / {:.5} | {:.0} / {:.4} | {:.1} | {best:.5} ({name}) | {} |",
+            mine.ms,
+            mine.rmse,
+            vtk.ms,
+            vtk.rmse,
+            vtk.ms / mine.ms,
+            if mine.rmse <= best { "yes" } else { "**no**" }
+        );
+    }
+}
+
+fn dominated(points: &BTreeMap<Key, BTreeMap<String, Point>>, out: &mut String) {
+    let _ = writeln!(out, "\n### For every peer's point, a setting with less time and less error\n");
+    let _ = writeln!(
+        out,
+        "| scene | view | peer | distance | ms / RMSE | answered by | ms / RMSE |\n|---|---|---|---|---|---|---|"
+    );
+    for ((scene, view, step), by_peer) in points {
+        for (peer, p) in by_peer.iter().filter(|(n, _)| !own(n)) {
+            let settings = points
+                .iter()
+                .filter(|((s, v, _), _)| s == scene && v == view)
+                .flat_map(|((_, _, step), all)| all.iter().filter(|(n, _)| own(n)).map(move |(n, p)| (step, n, *p)));
+            let better = settings.filter(|(_, _, q)| q.ms < p.ms && q.rmse < p.rmse);
+            let best = better.min_by(|a, b| a.2.ms.total_cmp(&b.2.ms));
+            let (by, figures) = match best {
+                Some((s, n, q)) => (format!("{n} at {s}"), format!("{:.0} / {:.5}", q.ms, q.rmse)),
+                None => ("**none**".to_owned(), String::new()),
+            };
+            let _ = writeln!(
+                out,
+                "| {scene} | {view} | {peer} | {step} | {:.0} / {:.5} | {by} | {figures} |",
+                p.ms, p.rmse
+            );
+        }
+    }
+}
+
+fn scaling(points: &BTreeMap<Key, BTreeMap<String, Point>>, out: &mut String) {
+    let _ = writeln!(
+        out,
+        "\n### One thread and all\n\n| scene | view | distance | one thread, ms | all, ms | ratio |\n|---|---|---|---|---|---|"
+    );
+    for ((scene, view, step), by_peer) in points {
+        if let (Some(one), Some(all)) = (by_peer.get("volact-1-thread"), by_peer.get("volact")) {
+            let _ =
+                writeln!(out, "| {scene} | {view} | {step} | {:.0} | {:.0} | {:.2} |", one.ms, all.ms, one.ms / all.ms);
+        }
+    }
+}
