@@ -311,9 +311,12 @@ impl<'a> Picture<'a> {
         for shape in drawn.iter().copied().filter(|s| s.compositing() != Compositing::Over) {
             let (Some(texture), Some(place)) = (shape.volume("volume"), Place::new(shape)) else { continue };
             let (voxels, units) = voxels(shape, texture);
-            let bounds = resources.bounds(shape).filter(|_| settings.skipping && !voxels.nearest);
+            let skips = settings.skipping && !voxels.nearest;
+            let peaks = resources.peaks(shape).filter(|_| skips);
+            let range = resources.bounds(shape).and_then(|b| b.range).filter(|_| skips);
             let compositing = shape.compositing();
-            let job = reduce::Job { voxels, lattice, compositing, bounds, empty: resources.empty(shape.id) };
+            let empty = resources.empty(shape.id).filter(|_| skips);
+            let job = reduce::Job { voxels, lattice, compositing, peaks, range, empty };
             let grey = || LookupTable::grey(texture.range());
             let table = shape.table("lookup_table").cloned().unwrap_or_else(grey).resolve(texture.range());
             let rays = Rays::new(&grid, place);

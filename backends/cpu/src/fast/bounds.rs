@@ -11,9 +11,6 @@ use volact_core::ScalarType;
 /// Cells of a block along each axis.
 pub const BLOCK: usize = 4;
 
-/// Blocks of a coarse block along each axis.
-pub const COARSE: usize = 4;
-
 /// Bounds of all blocks.
 #[derive(Clone, Debug)]
 pub struct ValueBounds {
@@ -25,9 +22,6 @@ pub struct ValueBounds {
     /// Lower and upper bound of each block in steps of `range`/255, rounded outward; `[255, 0]`
     /// where a block holds no number.
     quantised: Vec<[u8; 2]>,
-    /// Coarse blocks along each axis, and their bounds.
-    pub coarse_blocks: [usize; 3],
-    coarse: Vec<[u8; 2]>,
     /// Whether numbers may be infinite: then the outermost steps have no outer end.
     float: bool,
 }
@@ -50,14 +44,8 @@ impl ValueBounds {
         let float = voxels.scalar.is_float();
         // One more, so that four bytes can be read at the last.
         let quantised = vec![[255u8, 0]; slab * blocks[2] + 1];
-        let coarse_blocks = blocks.map(|n| n.div_ceil(COARSE));
-        let coarse = vec![[255u8, 0]; coarse_blocks.iter().product::<usize>() + 1];
-        let mut bounds = Self { blocks, range: None, quantised, coarse_blocks, coarse, float };
-        bounds.range = match voxels.scalar.limits() {
-            // Every number of an 8-bit type is a step of its own.
-            Some([lo, hi]) if voxels.scalar.size() == 1 => Some([lo as f32, hi as f32]),
-            _ => data_range(voxels, threads),
-        };
+        let mut bounds = Self { blocks, range: None, quantised, float };
+        bounds.range = number_range(voxels, threads);
         let Some(range) = bounds.range else { return bounds };
         let per_thread = blocks[2].div_ceil(threads.max(1));
         std::thread::scope(|scope| {
@@ -69,47 +57,39 @@ impl ValueBounds {
                 });
             }
         });
-        bounds.make_coarse();
         bounds
-    }
-
-    fn make_coarse(&mut self) {
-        let ([nx, ny, nz], [cx, cy, _]) = (self.blocks, self.coarse_blocks);
-        for z in 0..nz {
-            for y in 0..ny {
-                let row = &self.quantised[(z * ny + y) * nx..][..nx];
-                let coarse = &mut self.coarse[(z / COARSE * cy + y / COARSE) * cx..][..cx];
-                for (into, part) in coarse.iter_mut().zip(row.chunks(COARSE)) {
-                    for &[lo, hi] in part {
-                        *into = [into[0].min(lo), into[1].max(hi)];
-                    }
-                }
-            }
-        }
-    }
-
-    /// Bounds of coarse blocks, as [`steps`](Self::steps).
-    pub fn coarse(&self) -> &[[u8; 2]] {
-        &self.coarse
     }
 
     /// Bytes held.
     pub fn bytes(&self) -> usize {
-        (self.quantised.len() + self.coarse.len()) * 2
+        self.quantised.len() * 2
     }
 
-    /// Lower and upper bound of a block in steps; the lower one above the upper where it is empty.
-    pub fn steps(&self) -> &[[u8; 2]] {
-        &self.quantised
+    /// The highest steps near each block, of the maximum or (counted down from 255) the minimum.
+    pub fn peaks(&self, maximum: bool) -> Peaks {
+        let own = |&[lo, hi]: &[u8; 2]| if maximum { hi } else { 255 - lo };
+        let own: Vec<u8> = self.quantised[..self.quantised.len() - 1].iter().map(own).collect();
+        let mut near = widen(&own, self.blocks, Peaks::NEAR - 1);
+        let mut far = widen(&own, self.blocks, Peaks::FAR - 1);
+        near.extend([0; 4]);
+        far.extend([0; 4]);
+        let [lo, hi] = self.range.unwrap_or([0.0, 0.0]);
+        let start = if maximum { lo } else { -hi };
+        Peaks { blocks: self.blocks, near, far, start, step: (hi - lo) * (1.0 / 255.0), open: self.float }
     }
 
     /// The value of a step.
-    pub fn value(&self, step: u8) -> f32 {
+    fn value(&self, step: u8) -> f32 {
         let [lo, hi] = self.range.unwrap_or([0.0, 0.0]);
-        if self.float && (step == 0 || step == 255) {
-            return if step == 0 { f32::NEG_INFINITY } else { f32::INFINITY };
-        }
         if step == 255 { hi } else { lo + (hi - lo) * (f32::from(step) / 255.0) }
+    }
+
+    /// The lowest and highest value of a block of these steps. Floats may be infinite, but nothing
+    /// else lies below the first step or above the last.
+    fn values(&self, [lo, hi]: [u8; 2]) -> [f32; 2] {
+        let low = if self.float && lo == 0 { f32::NEG_INFINITY } else { self.value(lo) };
+        let high = if self.float && hi == 255 { f32::INFINITY } else { self.value(hi) };
+        [low, high]
     }
 
     /// Which blocks can be skipped, where `seen(lo, hi)` says whether any value of that interval
@@ -121,7 +101,8 @@ impl ValueBounds {
         for (d, &[lo, hi]) in distance.iter_mut().zip(&self.quantised) {
             let slot = &mut known[usize::from(lo) << 8 | usize::from(hi)];
             if *slot == 0 {
-                *slot = if lo <= hi && seen(self.value(lo), self.value(hi)) { 1 } else { 2 };
+                let [low, high] = self.values([lo, hi]);
+                *slot = if lo <= hi && seen(low, high) { 1 } else { 2 };
             }
             *d = if *slot == 1 { 0 } else { 255 };
         }
@@ -129,6 +110,54 @@ impl ValueBounds {
         distance.extend([0; 4]);
         Emptiness { blocks: self.blocks, distance }
     }
+}
+
+/// The best that blocks and those around them hold, for a maximum or a minimum.
+#[derive(Clone, Debug)]
+pub struct Peaks {
+    /// Blocks along each axis.
+    pub blocks: [usize; 3],
+    /// The highest step of all blocks nearer than `NEAR`, by Chebyshev distance; padded by 4 bytes.
+    pub near: Vec<u8>,
+    /// The same nearer than `FAR`.
+    pub far: Vec<u8>,
+    /// The number (negated for a minimum) of step 0.
+    pub start: f32,
+    /// The size of a step.
+    pub step: f32,
+    /// Whether step 255 may hold an infinity.
+    pub open: bool,
+}
+
+impl Peaks {
+    /// Blocks that `near` looks around, counting its own.
+    pub const NEAR: usize = 2;
+    /// Blocks that `far` looks around, counting its own.
+    pub const FAR: usize = 4;
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        self.near.len() + self.far.len()
+    }
+}
+
+/// The maximum over a cube of blocks `radius` either way, one axis at a time.
+fn widen(values: &[u8], [nx, ny, nz]: [usize; 3], radius: usize) -> Vec<u8> {
+    let mut from = values.to_vec();
+    for (stride, count) in [(1, nx), (nx, ny), (nx * ny, nz)] {
+        let mut to = from.clone();
+        for shift in 1..=radius.min(count.saturating_sub(1)) {
+            // Runs along the axis are `stride · count` long; a shift stays inside its run.
+            for (run, other) in to.chunks_mut(stride * count).zip(from.chunks(stride * count)) {
+                let by = stride * shift;
+                let kept = run.len() - by;
+                run[..kept].iter_mut().zip(&other[by..]).for_each(|(r, o)| *r = (*r).max(*o));
+                run[by..].iter_mut().zip(&other[..kept]).for_each(|(r, o)| *r = (*r).max(*o));
+            }
+        }
+        from = to;
+    }
+    from
 }
 
 impl Emptiness {
@@ -222,8 +251,13 @@ fn bound_layer(voxels: &Voxels<'_>, blocks: [usize; 3], bz: usize, [lo, hi]: [f3
             // A little wider than exact, so that rounding here or in an interpolation is inside;
             // the ends of the range are exact, and empty air is known as such.
             let steps = |v: f32| (f64::from(v) - f64::from(lo)) * scale;
-            let low = if a >= hi { 255.0 } else { (steps(a) - 1e-4).floor().max(0.0) };
-            let high = if b <= lo { 0.0 } else { (steps(b) + 1e-4).ceil().min(255.0) };
+            let flat = lo >= hi;
+            let low = if a >= hi && !flat { 255.0 } else { (steps(a) - 1e-4).floor().max(0.0) };
+            let high = if flat {
+                255.0
+            } else if b <= lo {
+                0.0
+            } else { (steps(b) + 1e-4).ceil().min(255.0) };
             *q = [low as u8, high as u8];
         }
     }
@@ -282,6 +316,15 @@ fn bound_row(voxels: &Voxels<'_>, y: usize, z: usize, low: &mut [f32], high: &mu
     });
 }
 
+/// The range over which numbers are taken to occur: all of an 8-bit type, whose numbers are then
+/// a step each, else what the data ROI holds.
+pub fn number_range(voxels: &Voxels<'_>, threads: usize) -> Option<[f32; 2]> {
+    match voxels.scalar.limits() {
+        Some([lo, hi]) if voxels.scalar.size() == 1 => Some([lo as f32, hi as f32]),
+        _ => data_range(voxels, threads),
+    }
+}
+
 fn data_range(voxels: &Voxels<'_>, threads: usize) -> Option<[f32; 2]> {
     let layers = voxels.max[2] - voxels.min[2] + 1;
     let per_thread = layers.div_ceil(threads.max(1));
@@ -315,6 +358,20 @@ fn data_range(voxels: &Voxels<'_>, threads: usize) -> Option<[f32; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn widened_is_the_maximum_around() {
+        let blocks = [5, 3, 4];
+        let values: Vec<u8> = (0..60).map(|i: u32| (i * 97 % 251) as u8).collect();
+        let wide = widen(&values, blocks, 2);
+        let near = |a: usize, n: usize| a.saturating_sub(2)..(a + 3).min(n);
+        for (i, &got) in wide.iter().enumerate() {
+            let (x, y, z) = (i % 5, i / 5 % 3, i / 15);
+            let around =
+                near(z, 4).flat_map(|z| near(y, 3).flat_map(move |y| near(x, 5).map(move |x| (z * 3 + y) * 5 + x)));
+            assert_eq!(got, around.map(|j| values[j]).max().unwrap());
+        }
+    }
 
     #[test]
     fn distance_is_chebyshev() {

@@ -112,8 +112,26 @@ impl SegmentTable {
         (number * self.scale + self.offset).max(0.0).min((self.nodes - 1) as f32)
     }
 
+    /// Whether the end can be seen that all numbers of an interval are clamped to; `None` where
+    /// some are not, or rounding might let them in.
+    pub fn beyond(&self, lo: f32, hi: f32) -> Option<bool> {
+        let place = |v: f32| v * self.scale + self.offset;
+        let margin = 0.01 + 1e-5 * self.offset.abs();
+        let (first, last) = (self.entries[0][3], self.entries[self.nodes - 1][3]);
+        if place(hi) < -margin {
+            Some(first > 0.0)
+        } else if place(lo) > (self.nodes - 1) as f32 + margin {
+            Some(last > 0.0)
+        } else {
+            None
+        }
+    }
+
     /// Whether any number of an interval can be seen, through the interpolated table.
     pub fn sees(&self, lo: f32, hi: f32) -> bool {
+        if let Some(end) = self.beyond(lo, hi) {
+            return end;
+        }
         let node = |v: f32| self.coordinate(v) as usize;
         let (first, last) = (node(lo), node(hi));
         // An interval of nodes counts its own left end to its right neighbour; one more either

@@ -112,6 +112,7 @@ pub struct Base {
 
 impl Base {
     /// A base at a sample, which is moved into the data ROI.
+    #[inline(always)]
     pub fn new(voxels: &Voxels<'_>, at: [f64; 3]) -> Self {
         let at = std::array::from_fn(|a| at[a].clamp(voxels.min[a] as f64, voxels.max[a] as f64).floor() as i32);
         let local = |v: [usize; 3]| std::array::from_fn(|a| (v[a] as i64 - i64::from(at[a])) as f32);

@@ -333,6 +333,9 @@ impl<S: Simd> Kernel<S> for SampleKernel<'_, S> {
 
     #[inline(always)]
     unsafe fn end(&mut self, first: i64) -> u32 {
+        if self.rows == 0 {
+            return self.shared.done;
+        }
         let entries = &self.shared.job.table.entries;
         let (index, fraction, row_of, rows) = (&self.index, &self.fraction, &self.row_of, self.rows);
         // SAFETY: indices lie in the table, which has an entry after each.
@@ -440,6 +443,9 @@ impl<S: Simd> Kernel<S> for PairKernel<'_, S> {
 
     #[inline(always)]
     unsafe fn end(&mut self, first: i64) -> u32 {
+        if self.rows == 0 {
+            return self.shared.done;
+        }
         let pairs = self.pairs;
         let (index, front, back, row_of, rows) = (&self.index, &self.front, &self.back, &self.row_of, self.rows);
         // SAFETY: indices lie in the table, which has an entry and a row after each.

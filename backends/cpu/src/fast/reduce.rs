@@ -5,11 +5,11 @@
 use volact_core::{Compositing, lattice::Lattice};
 
 use super::{
-    bounds::{COARSE, Emptiness, ValueBounds},
+    bounds::{Emptiness, Peaks},
     fetch::{Base, Fetch, Voxels},
     packet::Packet,
     simd::{LANES, Simd},
-    walk::{CHUNK, Counts, Kernel, around, walk},
+    walk::{ALL, CHUNK, Counts, Kernel, around, walk},
 };
 
 /// One shape to reduce.
@@ -21,8 +21,10 @@ pub struct Job<'a> {
     pub lattice: Lattice,
     /// Maximum, minimum, average or add.
     pub compositing: Compositing,
-    /// Bounds of blocks, to skip what cannot change a maximum or minimum.
-    pub bounds: Option<&'a ValueBounds>,
+    /// What blocks hold at best, to skip what cannot change a maximum or minimum.
+    pub peaks: Option<&'a Peaks>,
+    /// The lowest and highest number of the data, where known.
+    pub range: Option<[f32; 2]>,
     /// Blocks that are zero throughout, to skip where values are added.
     pub empty: Option<&'a Emptiness>,
 }
@@ -65,7 +67,7 @@ pub unsafe fn reduce<S: Simd, F: Fetch>(job: &Job<'_>, packet: &Packet, counts: 
         match job.compositing {
             Compositing::Maximum | Compositing::Minimum => {
                 let mut kernel = Extreme::<S>::new(job, &out);
-                let blocks = job.bounds.map(|b| b.blocks);
+                let blocks = job.peaks.map(|p| p.blocks);
                 walk::<S, F, _>(&mut kernel, &job.voxels, packet, &cuts, step, blocks, counts);
                 kernel.finish(&mut out);
             }
@@ -136,7 +138,7 @@ impl<'a, S: Simd> Extreme<'a, S> {
     unsafe fn new(job: &'a Job<'a>, ends: &[Reduced; LANES]) -> Self {
         let sign = if job.compositing == Compositing::Maximum { 1.0 } else { -1.0 };
         let best = ends.map(|e| if e.length > 0.0 { sign * e.value as f32 } else { f32::NEG_INFINITY });
-        let range = job.bounds.and_then(|b| b.range).filter(|_| !job.voxels.scalar.is_float());
+        let range = job.range.filter(|_| !job.voxels.scalar.is_float());
         let limit = range.map_or(f32::INFINITY, |[lo, hi]| if sign > 0.0 { hi } else { -lo });
         // SAFETY: the caller's promises.
         unsafe { Self { job, sign, best: S::load(&best), limit } }
@@ -174,52 +176,33 @@ impl<S: Simd> Kernel<S> for Extreme<'_, S> {
     #[inline(always)]
     unsafe fn end(&mut self, _: i64) -> u32 {
         // SAFETY: the caller's promises.
-        unsafe { !S::lt_bits(self.best, S::splat(self.limit)) & super::walk::ALL }
+        unsafe { !S::lt_bits(self.best, S::splat(self.limit)) & ALL }
     }
 
     #[inline(always)]
     unsafe fn clear(&self, block: [S::F; 3], index: S::I) -> (u32, [S::F; 3], [S::F; 3]) {
-        // SAFETY: block indices are inside, and the lists are padded.
+        // SAFETY: the caller's promises.
         unsafe {
-            let Some(bounds) = self.job.bounds else { return around::<S>(block, S::splat(0.0)) };
-            let share = 1.0 / COARSE as f32;
-            let coarse = [0, 1, 2].map(|a| S::floor(S::mul(block[a], S::splat(share))));
-            let [nx, ny, _] = bounds.coarse_blocks.map(|n| S::splat_int(n as i32));
-            let [x, y, z] = coarse.map(|c| S::to_int(c));
-            let coarse_index = S::add_int(x, S::mul_int(nx, S::add_int(y, S::mul_int(ny, z))));
-            let wide = self.worse(bounds, bounds.coarse(), coarse_index);
-            let own = wide | self.worse(bounds, bounds.steps(), index);
-            let (size, one) = (S::splat(COARSE as f32), S::splat(1.0));
-            let mut low = block;
-            let mut high = block;
-            for a in 0..3 {
-                low[a] = S::select(wide, S::mul(coarse[a], size), block[a]);
-                high[a] = S::add(low[a], S::select(wide, size, one));
-            }
-            (own, low, high)
+            let nothing = S::splat(0.0);
+            let Some(peaks) = self.job.peaks else { return around::<S>(block, nothing) };
+            let near = S::select(self.worse(peaks, &peaks.near, index), S::splat(Peaks::NEAR as f32), nothing);
+            let far = self.worse(peaks, &peaks.far, index);
+            around::<S>(block, S::select(far, S::splat(Peaks::FAR as f32), near))
         }
     }
 }
 
 impl<S: Simd> Extreme<'_, S> {
-    /// Lanes whose best number no value of their block passes. Bounds are taken a ten-thousandth
-    /// wider, so that rounding here cannot make them narrower than they are.
+    /// Lanes whose best number no value around their block passes. Bounds are taken a
+    /// ten-thousandth wider, so that rounding here cannot make them narrower than they are.
     #[inline(always)]
-    unsafe fn worse(&self, bounds: &ValueBounds, steps: &[[u8; 2]], index: S::I) -> u32 {
-        let [lo, hi] = bounds.range.unwrap_or([0.0, 0.0]);
-        let step = (hi - lo) * (1.0 / 255.0);
-        // SAFETY: indices are inside, and the lists are padded by two bytes.
+    unsafe fn worse(&self, peaks: &Peaks, steps: &[u8], index: S::I) -> u32 {
+        // SAFETY: indices are inside, and the lists are padded by four bytes.
         unsafe {
-            let pair = S::gather(steps.as_ptr().cast(), S::shl::<1>(index));
-            let wide = S::splat(step * 1.0001);
-            let bound = if self.sign > 0.0 {
-                let high = S::to_float(S::and_int(S::shr::<8>(pair), S::splat_int(255)));
-                S::fma(high, wide, S::splat(lo))
-            } else {
-                let low = S::to_float(S::and_int(pair, S::splat_int(255)));
-                S::fma(S::sub(S::splat(255.0), low), wide, S::splat(-hi))
-            };
-            !S::lt_bits(self.best, bound) & super::walk::ALL
+            let step = S::to_float(S::and_int(S::gather(steps.as_ptr(), index), S::splat_int(255)));
+            let bound = S::fma(step, S::splat(peaks.step * 1.0001), S::splat(peaks.start));
+            let endless = if peaks.open { S::lt_bits(S::splat(254.5), step) } else { 0 };
+            !S::lt_bits(self.best, bound) & !endless & ALL
         }
     }
 }

@@ -11,7 +11,7 @@ use volact_core::{
 };
 
 use super::{
-    bounds::{Emptiness, ValueBounds},
+    bounds::{Emptiness, Peaks, ValueBounds},
     classify::{SegmentTable, Units},
     fetch::Voxels,
     options::{Classification, Settings},
@@ -62,6 +62,8 @@ pub struct Resources {
     tables: BTreeMap<u64, Tables>,
     /// By shape: what it depends on, and what can be skipped.
     empty: BTreeMap<u64, (EmptyKey, Arc<Emptiness>)>,
+    /// By data, and whether of the maximum.
+    peaks: BTreeMap<(BoundsKey, bool), Peaks>,
 }
 
 /// The component that a shape reads.
@@ -74,11 +76,13 @@ pub fn voxels<'a>(shape: &ResolvedShape, texture: &'a VolumeTexture) -> (Voxels<
     let desc = texture.volume().desc();
     let mut voxels = Voxels::new(texture, component(shape));
     let mut units = Units { scale: desc.slope, offset: desc.intercept };
-    let [lo, hi] = texture.range();
     let wide = matches!(desc.scalar, volact_core::ScalarType::F64)
         || matches!(desc.scalar, volact_core::ScalarType::U32 | volact_core::ScalarType::I32);
     if wide {
-        // f32 cannot hold these: fetch them relative to the texture's range instead.
+        // f32 cannot hold these: fetch them relative to the range of the data instead. Not of the
+        // texture: an integer's is that of its type, in which data of a few hundreds is lost, and
+        // bounds are shared by all textures of a volume.
+        let [lo, hi] = texture.volume().value_range().unwrap_or([0.0, 1.0]);
         let (a, b) = ((lo - desc.intercept) / desc.slope, (hi - desc.intercept) / desc.slope);
         voxels.origin = a;
         voxels.gain = if a == b { 1.0 } else { 1.0 / (b - a) };
@@ -125,6 +129,7 @@ impl Resources {
             keys.extend(shape.volume("volume").map(|t| bounds_key(t, component(shape))));
         }
         self.bounds.retain(|key, _| keys.contains(key));
+        self.peaks.retain(|(key, _), _| keys.contains(key));
         self.tables.retain(|id, _| ids.contains(id));
         self.empty.retain(|id, _| ids.contains(id));
     }
@@ -135,6 +140,7 @@ impl Resources {
         self.bounds.values().map(|b| b.bytes()).sum::<usize>()
             + self.tables.values().map(tables).sum::<usize>()
             + self.empty.values().map(|(_, e)| e.bytes()).sum::<usize>()
+            + self.peaks.values().map(Peaks::bytes).sum::<usize>()
     }
 
     /// Tables of a shape.
@@ -151,6 +157,12 @@ impl Resources {
     pub fn bounds(&self, shape: &ResolvedShape) -> Option<&ValueBounds> {
         let texture = shape.volume("volume")?;
         self.bounds.get(&bounds_key(texture, component(shape))).map(Arc::as_ref)
+    }
+
+    /// The best that blocks of a shape's volume hold, where that was made.
+    pub fn peaks(&self, shape: &ResolvedShape) -> Option<&Peaks> {
+        let texture = shape.volume("volume")?;
+        self.peaks.get(&(bounds_key(texture, component(shape)), shape.compositing() == Compositing::Maximum))
     }
 
     fn prepare_shape(
@@ -183,6 +195,14 @@ impl Resources {
             None => None,
         };
         if compositing != Compositing::Over {
+            let maximum = compositing == Compositing::Maximum;
+            if let (Some(bounds), true) = (&bounds, maximum || compositing == Compositing::Minimum)
+                && !self.peaks.contains_key(&(key, maximum))
+            {
+                let peaks = bounds.peaks(maximum);
+                say("peaks", peaks.bytes());
+                self.peaks.insert((key, maximum), peaks);
+            }
             if matches!(compositing, Compositing::Add | Compositing::Average) {
                 let zero = units.number(0.0) as f32;
                 let same = |k: &EmptyKey| *k == (0, key, 0);
@@ -220,7 +240,9 @@ impl Resources {
         let resolved = table.resolve(texture.range());
         let occurring = match &bounds {
             Some(b) => b.range.map(|r| r.map(f64::from)).filter(|_| !voxels.scalar.is_float()),
-            None => voxels.scalar.limits().filter(|_| voxels.gain == 1.0),
+            // The same without skipping, so that tables and picture are the same.
+            None if voxels.scalar.is_float() => None,
+            None => number_range(&voxels, settings.threads).map(|r| r.map(f64::from)),
         };
         let h = step / unit;
         let segments = SegmentTable::new(&resolved, units, occurring, h);
@@ -253,6 +275,9 @@ impl Resources {
         let transparent = |lo: f32, hi: f32| match &pairs {
             // The coarser grid of pairs reaches farther around a value.
             Some(pairs) => {
+                if let Some(end) = segments.beyond(lo, hi) {
+                    return !end;
+                }
                 let node = |v: f32| (v * pairs.scale + pairs.offset).clamp(0.0, (pairs.nodes - 1) as f32);
                 let (a, b) =
                     ((node(lo) - 1.001).floor().max(0.0), (node(hi) + 1.001).ceil().min((pairs.nodes - 1) as f32));
