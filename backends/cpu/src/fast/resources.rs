@@ -11,7 +11,7 @@ use volact_core::{
 };
 
 use super::{
-    bounds::{Emptiness, Peaks, ValueBounds},
+    bounds::{Emptiness, Peaks, ValueBounds, number_range},
     classify::{SegmentTable, Units},
     fetch::Voxels,
     options::{Classification, Settings},
