@@ -25,7 +25,11 @@ fn agree(what: &str, shapes: &[Shape], desc: &FrameDesc) {
     within(what, max_error(&Setup::post(0.43).colors(shapes, desc), &wanted), F32);
     let pre = Setup::rays(0.43).with("classification", "pre-integrated").colors(shapes, desc);
     // Values are tabulated in pairs.
-    within(&format!("{what}, pre-integrated"), max_error(&Setup::pre_integrated(0.43).colors(shapes, desc), &pre), 2e-4);
+    within(
+        &format!("{what}, pre-integrated"),
+        max_error(&Setup::pre_integrated(0.43).colors(shapes, desc), &pre),
+        2e-4,
+    );
 }
 
 fn look(eye: DVec3, projection: Projection) -> Camera {
@@ -38,7 +42,8 @@ fn every_kind_of_camera_agrees_with_the_reference() {
     let shapes = [scene()];
     agree("perspective", &shapes, &FrameDesc::new(look(eye, Projection::Perspective { fov_y: 35.0 }), 18, 13));
     agree("orthographic", &shapes, &FrameDesc::new(look(eye, Projection::Orthographic { height: 19.0 }), 18, 13));
-    let view = DMat4::from_mat3(DMat3::from_cols(DVec3::X, -DVec3::Z, DVec3::Y)) * DMat4::from_translation(-DVec3::new(7.0, -20.0, 5.0));
+    let view = DMat4::from_mat3(DMat3::from_cols(DVec3::X, -DVec3::Z, DVec3::Y))
+        * DMat4::from_translation(-DVec3::new(7.0, -20.0, 5.0));
     // Off-axis: left and right, bottom and top are not opposite. Row-major by eye, so transposed.
     let (l, r, b, t, n, f) = (-0.2, 0.5, -0.3, 0.45, 1.0, 90.0);
     let frustum = |depth: [f64; 2]| {
@@ -63,7 +68,10 @@ fn mirrored_sheared_and_flattened_shapes_agree() {
     let camera = look(DVec3::new(20.0, -25.0, 17.0), Projection::Perspective { fov_y: 45.0 });
     let shear = DMat3::from_cols(DVec3::X, DVec3::new(0.5, 1.0, 0.2), DVec3::new(-0.3, 0.4, 1.0));
     let maps = [
-        ("mirrored", DAffine3::from_translation(DVec3::new(13.0, 0.0, 0.0)) * DAffine3::from_scale(DVec3::new(-1.0, 1.0, 1.0))),
+        (
+            "mirrored",
+            DAffine3::from_translation(DVec3::new(13.0, 0.0, 0.0)) * DAffine3::from_scale(DVec3::new(-1.0, 1.0, 1.0)),
+        ),
         ("sheared", DAffine3::from_mat3(shear)),
         ("flattened", DAffine3::from_scale(DVec3::new(1.0, 1.0, 0.2))),
         ("turned", DAffine3::from_axis_angle(DVec3::new(1.0, 2.0, 3.0).normalize(), 0.7)),
@@ -119,9 +127,14 @@ fn near_and_far_cut_the_ray() {
         near,
         far,
     };
-    for (near, far, length) in
-        [(0.0, f64::INFINITY, 8.0), (12.5, f64::INFINITY, 5.5), (0.0, 13.0, 3.0), (11.0, 11.25, 0.25), (18.5, 30.0, 0.0), (0.0, 9.0, 0.0)]
-    {
+    for (near, far, length) in [
+        (0.0, f64::INFINITY, 8.0),
+        (12.5, f64::INFINITY, 5.5),
+        (0.0, 13.0, 3.0),
+        (11.0, 11.25, 0.25),
+        (18.5, 30.0, 0.0),
+        (0.0, 9.0, 0.0),
+    ] {
         let wanted = [[1.0 - 0.8f64.powf(length); 4]];
         let desc = FrameDesc::new(camera(near, far), 1, 1);
         within("exact", max_error(&truth(std::slice::from_ref(&shape), &desc).color, &wanted), 1e-9);
@@ -183,7 +196,12 @@ fn orthographic_eye_moved_back_changes_no_bit() {
 fn lattice_is_counted_from_the_eye_or_the_origin() {
     // Red up to y = 5, then green: the colour of a segment tells where its middle lies.
     let data = volume([2, 11, 2], ScalarType::F32, |p| p.y);
-    let table = colors(&[(0.0, [1.0, 0.0, 0.0], 0.2), (5.0, [1.0, 0.0, 0.0], 0.2), (5.0, [0.0, 1.0, 0.0], 0.2), (10.0, [0.0, 1.0, 0.0], 0.2)]);
+    let table = colors(&[
+        (0.0, [1.0, 0.0, 0.0], 0.2),
+        (5.0, [1.0, 0.0, 0.0], 0.2),
+        (5.0, [0.0, 1.0, 0.0], 0.2),
+        (10.0, [0.0, 1.0, 0.0], 0.2),
+    ]);
     let shape = lut(&data, table, 1.0);
     let green = |n: [f64; 2]| 0.8f64.powf(n[0]) - 0.8f64.powf(n[1]);
     // Step 4: segments 0–4, 4–8, 8–10 from the origin; the middle of the second is green.

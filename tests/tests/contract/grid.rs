@@ -106,7 +106,9 @@ fn geometry_roi_moves_and_scales_the_texture_and_meets_the_block() {
 #[test]
 fn nearest_takes_the_nearest_sample() {
     let rule = |p: DVec3| (1.0 + p.x + 4.0 * p.z) / 32.0;
-    let shape = probe(&VolumeTexture::new(&volume([4, 2, 3], ScalarType::U8, |p| 255.0 * rule(p))).with_filter(Filter::Nearest));
+    let shape = probe(
+        &VolumeTexture::new(&volume([4, 2, 3], ScalarType::U8, |p| 255.0 * rule(p))).with_filter(Filter::Nearest),
+    );
     let stored = |p: DVec3| (255.0 * rule(p)).round();
     for (x, z) in [(0.49, 0.1), (0.51, 0.1), (1.4, 1.6), (2.9, 1.4), (2.51, 0.51)] {
         let wanted = stored(DVec3::new(f64::round(x), 0.0, f64::round(z)));
@@ -115,7 +117,8 @@ fn nearest_takes_the_nearest_sample() {
         assert_eq!(found, Some(1.0_f64.min(wanted)), "{x}, {z}");
     }
     let table = LookupTable::grey([0.0, 255.0]);
-    let texture = VolumeTexture::new(&volume([4, 2, 3], ScalarType::U8, |p| 255.0 * rule(p))).with_filter(Filter::Nearest);
+    let texture =
+        VolumeTexture::new(&volume([4, 2, 3], ScalarType::U8, |p| 255.0 * rule(p))).with_filter(Filter::Nearest);
     let shape = shaded("average", &texture, table, 1.0);
     for (x, z) in [(0.49, 0.1), (0.51, 0.1), (1.4, 1.6), (2.9, 1.4), (2.51, 0.51)] {
         is(mean(&shape, x, z), stored(DVec3::new(f64::round(x), 0.0, f64::round(z))) / 255.0);
@@ -264,15 +267,18 @@ fn not_a_number_is_transparent_wherever_it_has_weight() {
 fn fine_data_on_a_large_offset_keeps_its_detail() {
     let rule = |p: DVec3| 0.5 + 0.4 * (p.x + 0.7 * p.y).sin() * p.z.cos();
     let table = |o: f64| greys(&[(o, 0.1, 0.0), (o + 1.0, 0.9, 0.7)]);
-    let wanted = Setup::rays(0.2).colors(&[lut(&volume([5, 6, 7], ScalarType::F64, rule), table(0.0), 1.0)], &oblique(10));
+    let wanted =
+        Setup::rays(0.2).colors(&[lut(&volume([5, 6, 7], ScalarType::F64, rule), table(0.0), 1.0)], &oblique(10));
     let offset = 1e7;
     let shape = [lut(&volume([5, 6, 7], ScalarType::F64, |p| offset + rule(p)), table(offset), 1.0)];
     // f64 at 1e7 has steps of 2e-9.
     within("reference", max_error(&Setup::rays(0.2).colors(&shape, &oblique(10)), &wanted), 1e-6);
     within("cpu", max_error(&Setup::post(0.2).colors(&shape, &oblique(10)), &wanted), 1e-5);
-    let whole = [lut(&volume([5, 6, 7], ScalarType::U32, |p| 4e9 + (1000.0 * rule(p)).round()), {
-        greys(&[(4e9, 0.1, 0.0), (4e9 + 1000.0, 0.9, 0.7)])
-    }, 1.0)];
+    let whole = [lut(
+        &volume([5, 6, 7], ScalarType::U32, |p| 4e9 + (1000.0 * rule(p)).round()),
+        { greys(&[(4e9, 0.1, 0.0), (4e9 + 1000.0, 0.9, 0.7)]) },
+        1.0,
+    )];
     let wanted = Setup::rays(0.2).colors(&whole, &oblique(10));
     within("cpu, u32", max_error(&Setup::post(0.2).colors(&whole, &oblique(10)), &wanted), 1e-5);
 }

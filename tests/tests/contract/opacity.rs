@@ -37,7 +37,8 @@ fn constant_medium_absorbs_its_share_over_each_unit() {
             }
         }
     }
-    within("exact, relative", exact, 1e-9);
+    // Enclosures are absolute; optical depths down to 5e-9 keep seven digits all the same.
+    within("exact, relative", exact, 1e-7);
     // f32: α of a segment and up to a hundred sums, each rounded to 6e-8.
     within("cpu, relative", cpu, 1e-5);
 }

@@ -4,7 +4,7 @@ use volact_conformance::{
     metrics::{between, max_error, order, rms_error, within},
     rig::{Setup, truth},
     rules::{Rule, march, smooth},
-    scene::{along_y, cell, greys, lut, placed, square},
+    scene::{along_y, cell, greys, lut, placed, square, volume},
 };
 use volact_core::{FrameDesc, LookupTable, ScalarType, Shape, VolumeDesc, glam::DVec3};
 
@@ -16,9 +16,14 @@ fn smooth_scene() -> ([Shape; 1], FrameDesc) {
     ([lut(&cell(), table, 0.4)], square(DVec3::splat(0.5), DVec3::new(5.0, -9.0, 6.0), 1.2, 16))
 }
 
+/// The value rises along every ray of this view, so that each crosses the step once and none grazes.
 fn stepped_scene() -> ([Shape; 1], FrameDesc) {
     let table = greys(&[(0.0, 0.3, 0.1), (0.4, 0.3, 0.1), (0.4, 0.9, 0.8), (1.0, 0.9, 0.8)]);
-    ([lut(&cell(), table, 0.4)], square(DVec3::splat(0.5), DVec3::new(5.0, -9.0, 6.0), 1.2, 24))
+    let rising = volume([2, 2, 2], ScalarType::F32, |p| {
+        let (x, z) = (1.0 - p.x, 1.0 - p.z);
+        0.1 + 0.3 * p.y + 0.35 * x * p.y * z + 0.1 * x + 0.1 * z
+    });
+    ([lut(&rising, table, 0.4)], square(DVec3::splat(0.5), DVec3::new(5.0, -9.0, 6.0), 1.2, 24))
 }
 
 fn errors((shapes, desc): &([Shape; 1], FrameDesc), setup: impl Fn(f64) -> Setup) -> Vec<(f64, f64)> {
@@ -110,15 +115,25 @@ fn cpu_is_the_midpoint_rule_and_no_other() {
 fn grid_refinement_is_of_second_order() {
     let field = |p: DVec3| 0.5 + 0.4 * (4.0 * p.x + 5.0 * p.y + 0.3).sin() * (3.0 * p.z - 2.0 * p.y).cos();
     let table: LookupTable = greys(&[(0.0, 0.1, 0.05), (1.0, 0.9, 0.85)]);
-    let places: Vec<_> = (0..5).flat_map(|i| (0..5).map(move |k| (0.13 + 0.17 * f64::from(i), 0.11 + 0.18 * f64::from(k)))).collect();
-    let wanted: Vec<_> = places.iter().map(|&(x, z)| {
-        let medium = |y: f64| {
-            let v = field(DVec3::new(x, y, z));
-            [0.1 + 0.8 * v, 0.05 + 0.8 * v]
-        };
-        let [grey, a] = smooth(&|t| { let [g, a] = medium(t); [g, 1.0 - (1.0 - a).powf(2.0)] }, 1.0);
-        [grey, grey, grey, a]
-    }).collect();
+    let places: Vec<_> =
+        (0..5).flat_map(|i| (0..5).map(move |k| (0.13 + 0.17 * f64::from(i), 0.11 + 0.18 * f64::from(k)))).collect();
+    let wanted: Vec<_> = places
+        .iter()
+        .map(|&(x, z)| {
+            let medium = |y: f64| {
+                let v = field(DVec3::new(x, y, z));
+                [0.1 + 0.8 * v, 0.05 + 0.8 * v]
+            };
+            let [grey, a] = smooth(
+                &|t| {
+                    let [g, a] = medium(t);
+                    [g, 1.0 - (1.0 - a).powf(2.0)]
+                },
+                1.0,
+            );
+            [grey, grey, grey, a]
+        })
+        .collect();
     for (name, setup) in [("exact", Setup::exact()), ("cpu", Setup::post(1.0 / 512.0))] {
         let errors: Vec<_> = [5usize, 9, 17, 33]
             .map(|n| {

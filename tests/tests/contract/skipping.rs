@@ -11,7 +11,18 @@ use volact_core::{
 };
 
 fn sparse() -> volact_core::LookupTable {
-    colors(&[(60.0, [0.9, 0.2, 0.1], 0.0), (80.0, [0.2, 0.9, 0.3], 0.5), (90.0, [0.1, 0.2, 1.0], 0.0), (190.0, [1.0; 3], 0.0), (200.0, [1.0; 3], 1.0)])
+    colors(&[
+        (60.0, [0.9, 0.2, 0.1], 0.0),
+        (80.0, [0.2, 0.9, 0.3], 0.5),
+        (90.0, [0.1, 0.2, 1.0], 0.0),
+        (190.0, [1.0; 3], 0.0),
+        (200.0, [1.0; 3], 1.0),
+    ])
+}
+
+/// For the lowest value, which is 0 along most rays.
+fn dark() -> volact_core::LookupTable {
+    greys(&[(0.0, 0.3, 0.4), (90.0, 1.0, 0.9), (200.0, 0.1, 0.0)])
 }
 
 /// A volume of f32 with holes, empty for the most part.
@@ -26,15 +37,28 @@ fn holes() -> volact_core::Volume {
 /// Scenes by name, with all ways of compositing, types and filters.
 fn scenes() -> Vec<(String, Vec<Shape>)> {
     let mut all = Vec::new();
+    let table = |shader: &str| if shader == "minip" { dark() } else { sparse() };
     for scalar in [ScalarType::U8, ScalarType::I16, ScalarType::F32] {
         let texture = VolumeTexture::new(&ball([37, 29, 33], scalar));
         for shader in ["lut", "mip", "minip", "average", "xray"] {
-            all.push((format!("{shader} of {scalar}"), vec![shaded(shader, &texture, sparse(), 2.0)]));
+            all.push((format!("{shader} of {scalar}"), vec![shaded(shader, &texture, table(shader), 2.0)]));
         }
     }
     for shader in ["lut", "mip", "minip", "average", "xray"] {
         let texture = VolumeTexture::new(&holes());
-        all.push((format!("{shader} with holes"), vec![shaded(shader, &texture, sparse(), 2.0)]));
+        all.push((format!("{shader} with holes"), vec![shaded(shader, &texture, table(shader), 2.0)]));
+    }
+    // What is clamped lies at the ends of the table: neither may be skipped where it is seen.
+    let ends = greys(&[
+        (-9.0, 0.1, 0.0),
+        (0.0, 0.5, 0.01),
+        (50.0, 0.1, 0.0),
+        (150.0, 0.1, 0.0),
+        (200.0, 1.0, 0.7),
+        (300.0, 1.0, 0.0),
+    ]);
+    for scalar in [ScalarType::U16, ScalarType::F16, ScalarType::F32] {
+        all.push((format!("ends of {scalar}"), vec![lut(&ball([37, 29, 33], scalar), ends.clone(), 2.0)]));
     }
     let texture = VolumeTexture::new(&ball([37, 29, 33], ScalarType::U8));
     all.push(("nearest".into(), vec![lut_of(&texture.clone().with_filter(Filter::Nearest), sparse(), 1.0)]));
@@ -83,8 +107,10 @@ fn skipping_leaves_every_bit() {
 fn skipping_skips() {
     let shape = [lut(&ball([64, 64, 64], ScalarType::U8), sparse(), 2.0)];
     let desc = FrameDesc::fit(&shape[0], View::Iso, 24, 24);
-    let samples = |on: bool| Setup::post(0.5).with("skipping", on).draw(&shape, &desc).statistics.samples;
-    assert!(2 * samples(true) < samples(false), "{} of {}", samples(true), samples(false));
+    for setup in [Setup::post(0.5), Setup::pre_integrated(0.5)] {
+        let samples = |on: bool| setup.clone().with("skipping", on).draw(&shape, &desc).statistics.samples;
+        assert!(2 * samples(true) < samples(false), "{} of {}", samples(true), samples(false));
+    }
 }
 
 #[test]

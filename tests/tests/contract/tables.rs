@@ -74,7 +74,11 @@ fn window_and_level_make_a_ramp_clamped_outside() {
     for setup in [Setup::exact(), Setup::post(0.3), Setup::pre_integrated(0.3)] {
         for (value, t) in [(-1000.0, 0.0), (0.0, 0.0), (20.0, 0.25), (40.0, 0.5), (80.0, 1.0), (3000.0, 1.0)] {
             let a = 0.5 * t;
-            within(&format!("value {value}"), max_error(&[at(value, &table, &setup)], &[[t * a, t * a, t * a, a]]), 2e-6);
+            within(
+                &format!("value {value}"),
+                max_error(&[at(value, &table, &setup)], &[[t * a, t * a, t * a, a]]),
+                2e-6,
+            );
         }
     }
     assert!(LookupTable::window_level(0.0, 40.0, 0.5).is_err());
