@@ -191,8 +191,8 @@ impl Camera {
         }
     }
 
-    /// World to clip space for a viewport: x and y in −1 to 1, y up, depth 0 to 1 for near to
-    /// far (far infinite: reversed is not used; depth tends to 1).
+    /// World to view space: the eye (or a point of its plane) at the origin, x to the right, y up,
+    /// looking along −z.
     ///
     /// # Errors
     /// As [`rays`](Self::rays).

@@ -59,6 +59,9 @@ impl Aabb {
     /// The stretch of the line `origin + t·direction` inside the closed box; `None` if it misses.
     /// May be a single point.
     pub fn clip_line(&self, origin: DVec3, direction: DVec3) -> Option<[f64; 2]> {
+        if self.is_empty() {
+            return None;
+        }
         let (mut t0, mut t1) = (f64::NEG_INFINITY, f64::INFINITY);
         for a in 0..3 {
             if direction[a] == 0.0 {
@@ -205,6 +208,12 @@ mod tests {
             (b - a).cross(c - a).dot(d - a) / 6.0
         };
         assert!(mesh.tetrahedra.iter().all(|t| (volume(t) - 5.0).abs() < 1e-12));
+    }
+
+    #[test]
+    fn line_misses_an_inverted_box() {
+        let inverted = Aabb::new(DVec3::ZERO, DVec3::new(1.0, -1.0, 1.0));
+        assert_eq!(inverted.clip_line(DVec3::new(-1.0, -1.0, -1.0), DVec3::ONE), None);
     }
 
     #[test]

@@ -156,10 +156,12 @@ impl Registry {
         let context = Context { shaders: self.shaders.clone() };
         if name == "checked" {
             let mut inner = options.clone();
-            let of = match inner.remove("of") {
-                Some(ParameterValue::Choice(of)) => of,
-                _ => "cpu".to_owned(),
-            };
+            let decl = declaration.parameter("of").cloned().unwrap_or_else(|| {
+                ParameterDecl::new("of", ParameterType::Choice, "the action to wrap").default("cpu")
+            });
+            let named = inner.remove("of").or(decl.default.clone()).map(|v| decl.accept(&v)).transpose();
+            let named = named.map_err(|p| ActionError::Options { action: name.into(), problems: vec![p] })?;
+            let Some(ParameterValue::Choice(of)) = named else { return Err(self.unknown_action("")) };
             if of == "checked" {
                 return Err(self.unknown_action("checked of checked"));
             }

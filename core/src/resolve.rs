@@ -5,6 +5,7 @@ use glam::DAffine3;
 use crate::{
     Aabb, ActionError, Compositing, LookupTable, ParameterValue, ShaderEntry, Shape, VolumeTexture, Warning,
     WarningCode,
+    geometry::GeometryError,
     parameter::{ParameterMap, ParameterProblem, ProblemKind},
     shader::ShaderCatalog,
     shape::ShapeState,
@@ -50,6 +51,7 @@ impl ResolvedShape {
             improve_hints(&mut problems, &shader, shaders);
             ActionError::Parameters { shape: name.clone(), shader: state.shader.clone(), problems }
         })?;
+        check_geometry(&name, &state)?;
         let to_object = state.transform.inverse();
         let finite = state.transform.is_finite() && to_object.is_finite();
         if !finite || state.transform.matrix3.determinant() == 0.0 {
@@ -108,6 +110,13 @@ impl ResolvedShape {
         Some(self.volume("volume").map_or(block, |v| block.intersection(&v.geometry_roi())))
     }
 
+    /// The world box around what [`block`](Self::block) holds, or around the geometry's bounds.
+    pub fn world_block(&self) -> Aabb {
+        let corners = self.block().unwrap_or_else(|| self.state.geometry.bounds()).corners();
+        let world = corners.map(|c| self.state.transform.transform_point3(c));
+        world.iter().fold(Aabb::EMPTY, |b, &c| Aabb { min: b.min.min(c), max: b.max.max(c) })
+    }
+
     /// Whether nothing that a picture depends on differs from an earlier resolution.
     pub fn same_content(&self, other: &Self) -> bool {
         let versions = |r: &Self| r.parameters.values().map(ParameterValue::content_version).collect::<Vec<_>>();
@@ -117,6 +126,21 @@ impl ResolvedShape {
             && self.parameters == other.parameters
             && versions(self) == versions(other)
     }
+}
+
+/// Refuses bounds that no geometry can have.
+fn check_geometry(shape: &str, state: &ShapeState) -> Result<(), ActionError> {
+    let bounds = state.geometry.bounds();
+    if bounds.min.is_finite() && bounds.max.is_finite() && !bounds.is_empty() {
+        return Ok(());
+    }
+    let source = GeometryError::Invalid {
+        geometry: state.geometry.name().into(),
+        what: "bounds".into(),
+        found: format!("{} to {}", bounds.min, bounds.max),
+        wanted: "finite corners, none below the other".into(),
+    };
+    Err(ActionError::Geometry { shape: shape.into(), source })
 }
 
 fn improve_hints(problems: &mut [ParameterProblem], shader: &ShaderEntry, shaders: &ShaderCatalog) {

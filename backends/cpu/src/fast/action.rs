@@ -1,10 +1,11 @@
 //! The life cycle of `cpu`.
 
-use std::{sync::Mutex, time::Instant};
+use std::{collections::BTreeSet, sync::Mutex, time::Instant};
 
 use volact_core::{
-    ActionError, Caps, Compositing, Context, Declaration, Frame, FrameDesc, LookupTable, Method, Options,
+    Aabb, ActionError, Caps, Compositing, Context, Declaration, Frame, FrameDesc, LookupTable, Method, Options,
     ParameterValue, RayGrid, RenderAction, Shape, TableInterpolation, Viewport,
+    frame::Rebuild,
     lattice::Lattice,
     lifecycle::{Lifecycle, OpenFrame},
     parameter::{ParameterProblem, ProblemKind},
@@ -16,11 +17,11 @@ use volact_core::{
 use super::{
     classify::Units,
     dispatch, general,
-    options::{Settings, declaration},
+    options::{Classification, Settings, declaration},
     over,
     packet::{Place, Rays, SIDE},
     reduce,
-    resources::{Resources, voxels},
+    resources::{Resources, reduction, voxels},
     simd::LANES,
     walk::Counts,
 };
@@ -38,7 +39,26 @@ pub struct CpuAction {
     settings: Settings,
     lifecycle: Lifecycle,
     resources: Resources,
-    started: Option<(Instant, f64, Vec<volact_core::frame::Rebuild>)>,
+    started: Option<Started>,
+    /// Step and way of the last frame: what is managed beside what is drawn does not change them.
+    last: Option<Plan>,
+    /// Warnings that the process-wide handler has had.
+    said: BTreeSet<String>,
+}
+
+/// What tables depend on beside their shape.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Plan {
+    step: f64,
+    general: bool,
+}
+
+/// A frame that has begun.
+#[derive(Debug)]
+struct Started {
+    at: Instant,
+    plan: Plan,
+    rebuilt: Vec<Rebuild>,
 }
 
 impl CpuAction {
@@ -56,6 +76,8 @@ impl CpuAction {
             lifecycle: Lifecycle::new(context.clone()),
             resources: Resources::default(),
             started: None,
+            last: None,
+            said: BTreeSet::new(),
         })
     }
 
@@ -149,8 +171,10 @@ impl RenderAction for CpuAction {
         let start = Instant::now();
         let open = self.lifecycle.begin(frame, check)?;
         let shapes: Vec<ResolvedShape> = open.shapes.values().cloned().collect();
-        let step = match self.step(&shapes.iter().collect::<Vec<_>>()) {
-            Ok(step) => step,
+        let managed: Vec<_> = shapes.iter().collect();
+        // What is drawn is not known yet: most likely what was drawn last, else everything.
+        let plan = match self.step(&managed) {
+            Ok(step) => self.last.unwrap_or(Plan { step, general: uses_general(&managed) }),
             Err(error) => {
                 self.lifecycle.abandon();
                 return Err(error);
@@ -158,8 +182,8 @@ impl RenderAction for CpuAction {
         };
         let mut rebuilt = Vec::new();
         self.resources.retain(shapes.iter());
-        self.resources.prepare(shapes.iter(), step, &self.settings, &mut rebuilt);
-        self.started = Some((start, step, rebuilt));
+        self.resources.prepare(shapes.iter(), plan.step, plan.general, &self.settings, &mut rebuilt);
+        self.started = Some(Started { at: start, plan, rebuilt });
         Ok(())
     }
 
@@ -169,13 +193,17 @@ impl RenderAction for CpuAction {
 
     fn end_draw(&mut self) -> Result<Frame, ActionError> {
         let open = self.lifecycle.end()?;
-        let (start, prepared, mut rebuilt) = self.started.take().unwrap_or((Instant::now(), 0.0, Vec::new()));
+        let Some(Started { at: start, plan: prepared, mut rebuilt }) = self.started.take() else {
+            return Err(ActionError::NotDrawing { call: "end_draw" });
+        };
         let drawn: Vec<&ResolvedShape> = open.drawn_shapes().collect();
-        // What is managed but not drawn must not change the step.
+        // What is managed but not drawn must not change the picture.
         let step = self.step(&drawn)?;
-        if step != prepared {
-            self.resources.prepare(drawn.iter().copied(), step, &self.settings, &mut rebuilt);
+        let plan = Plan { step, general: uses_general(&drawn) };
+        if plan != prepared {
+            self.resources.prepare(drawn.iter().copied(), step, plan.general, &self.settings, &mut rebuilt);
         }
+        self.last = (!drawn.is_empty()).then_some(plan);
         let prepare = start.elapsed();
         let mut frame = Frame::empty(&open.desc);
         let counts = Picture::new(&open, &drawn, &self.resources, &self.settings, step)?.draw(&mut frame);
@@ -185,8 +213,12 @@ impl RenderAction for CpuAction {
             let code = volact_core::WarningCode::NothingVisible;
             frame.warnings.push(volact_core::Warning::new(code, NAME, message));
         }
-        let new = |w: &&volact_core::Warning| w.severity == volact_core::Severity::Warning;
-        frame.warnings.iter().filter(new).for_each(volact_core::Warning::emit);
+        frame.warnings.extend(self.adjusted(&drawn));
+        for warning in frame.warnings.iter().filter(|w| w.severity == volact_core::Severity::Warning) {
+            if self.said.insert(warning.to_string()) {
+                warning.emit();
+            }
+        }
         frame.method = self.method(&drawn, step);
         let stats = &mut frame.statistics;
         (stats.rays, stats.samples) = (counts.rays, counts.samples);
@@ -206,11 +238,25 @@ impl RenderAction for CpuAction {
         let resolved = resolved.map_err(|problems| ActionError::Options { action: NAME.into(), problems })?;
         self.settings = read(&resolved)?;
         self.given = given;
+        self.last = None;
         Ok(())
     }
 }
 
 impl CpuAction {
+    /// Settings asked for that a shape's way of drawing has no use for.
+    fn adjusted(&self, drawn: &[&ResolvedShape]) -> Vec<volact_core::Warning> {
+        let asked = self.settings.classification == Classification::PreIntegrated;
+        let tabled = |s: &&&ResolvedShape| s.compositing() == Compositing::Over && s.table("lookup_table").is_some();
+        let without = |s: &&&ResolvedShape| self.resources.tables(s.id).is_none_or(|t| t.pairs.is_none());
+        let warn = |s: &&ResolvedShape| {
+            let message = "classification pre-integrated is not done for overlapping shapes, \
+                           pre-interpolated tables and the nearest filter; it is drawn without";
+            volact_core::Warning::new(volact_core::WarningCode::SettingAdjusted, &s.name, message)
+        };
+        drawn.iter().filter(|_| asked).filter(tabled).filter(without).map(warn).collect()
+    }
+
     fn method(&self, drawn: &[&ResolvedShape], step: f64) -> Method {
         let mut classification: Vec<&str> = Vec::new();
         let mut width = 0;
@@ -246,21 +292,39 @@ impl CpuAction {
     }
 }
 
-/// Whether the `over` shapes need the plain way.
+/// Whether the `over` shapes need the plain way: they may overlap, or are no plain tables.
 fn uses_general(drawn: &[&ResolvedShape]) -> bool {
     let over: Vec<_> = drawn.iter().filter(|s| s.compositing() == Compositing::Over).collect();
     let plain = |s: &ResolvedShape| match s.table("lookup_table") {
         Some(table) => table.interpolation() == TableInterpolation::Pre,
         None => true,
     };
-    over.len() > 1 || over.iter().any(|s| plain(s))
+    let bounds: Vec<_> = over.iter().map(|s| s.world_block()).collect();
+    let apart = |a: &Aabb, b: &Aabb| (0..3).any(|i| a.max[i] <= b.min[i] || b.max[i] <= a.min[i]);
+    let overlap = bounds.iter().enumerate().any(|(i, a)| bounds[..i].iter().any(|b| !apart(a, b)));
+    overlap || over.iter().any(|s| plain(s))
 }
 
 /// One way of drawing a band of the picture.
 enum Pass<'a> {
-    Over { job: over::Job<'a>, rays: Rays },
-    General { layers: Vec<general::Layer<'a>> },
-    Reduce { job: reduce::Job<'a>, rays: Rays, units: Units, table: ResolvedTable, unit: f64 },
+    /// Shapes that no ray can meet at the same place.
+    Over {
+        parts: Vec<(over::Job<'a>, Rays)>,
+        layers: Vec<general::Layer<'a>>,
+    },
+    General {
+        layers: Vec<general::Layer<'a>>,
+    },
+    Reduce(Box<Reduction<'a>>),
+}
+
+/// A shape composited by maximum, minimum, average or add.
+struct Reduction<'a> {
+    job: reduce::Job<'a>,
+    rays: Rays,
+    units: Units,
+    table: ResolvedTable,
+    unit: f64,
 }
 
 /// A picture to draw.
@@ -286,10 +350,12 @@ impl<'a> Picture<'a> {
         let lattice = Lattice { step };
         let over: Vec<_> = drawn.iter().copied().filter(|s| s.compositing() == Compositing::Over).collect();
         let mut passes = Vec::new();
+        let empty = |id| resources.tables(id).and_then(|t| t.empty.as_ref());
+        let layers: Vec<_> = over.iter().filter_map(|s| general::Layer::new(s, empty(s.id))).collect();
         if uses_general(drawn) {
-            let layers = over.iter().filter_map(|s| general::Layer::new(s, resources.empty(s.id))).collect();
             passes.push(Pass::General { layers });
         } else {
+            let mut parts = Vec::new();
             for shape in over {
                 let (Some(texture), Some(place), Some(tables)) =
                     (shape.volume("volume"), Place::new(shape), resources.tables(shape.id))
@@ -301,12 +367,13 @@ impl<'a> Picture<'a> {
                     lattice,
                     table: &tables.table,
                     pairs: tables.pairs.as_ref(),
-                    empty: resources.empty(shape.id),
+                    empty: tables.empty.as_ref(),
                     termination: settings.termination as f32,
                     threshold: open.desc.depth_threshold,
                 };
-                passes.push(Pass::Over { job, rays: Rays::new(&grid, place) });
+                parts.push((job, Rays::new(&grid, place)));
             }
+            passes.push(Pass::Over { parts, layers });
         }
         for shape in drawn.iter().copied().filter(|s| s.compositing() != Compositing::Over) {
             let (Some(texture), Some(place)) = (shape.volume("volume"), Place::new(shape)) else { continue };
@@ -314,13 +381,14 @@ impl<'a> Picture<'a> {
             let skips = settings.skipping && !voxels.nearest;
             let peaks = resources.peaks(shape).filter(|_| skips);
             let range = resources.bounds(shape).and_then(|b| b.range).filter(|_| skips);
-            let compositing = shape.compositing();
-            let empty = resources.empty(shape.id).filter(|_| skips);
+            let compositing = reduction(shape, units);
+            let empty = resources.zeros(shape).filter(|_| skips);
             let job = reduce::Job { voxels, lattice, compositing, peaks, range, empty };
             let grey = || LookupTable::grey(texture.range());
             let table = shape.table("lookup_table").cloned().unwrap_or_else(grey).resolve(texture.range());
             let rays = Rays::new(&grid, place);
-            passes.push(Pass::Reduce { job, rays, units, table, unit: shape.float("unit_distance").unwrap_or(1.0) });
+            let unit = shape.float("unit_distance").unwrap_or(1.0);
+            passes.push(Pass::Reduce(Box::new(Reduction { job, rays, units, table, unit })));
         }
         let threshold = open.desc.depth_threshold;
         Ok(Self { grid, viewport, passes, settings: *settings, lattice, threshold })
@@ -388,26 +456,25 @@ impl<'a> Picture<'a> {
         let size = [self.viewport.width, self.viewport.height];
         let unit = self.settings.unit;
         match pass {
-            Pass::Over { job, rays } => {
-                if let Some(drawn) = dispatch::draw(unit, job, rays, dispatch::At { pixel: at, size }, counts) {
-                    *pixels = drawn;
-                    *zero = [self.grid.linear().depth_zero; LANES];
+            Pass::Over { parts, layers } => {
+                *zero = [self.grid.linear().depth_zero; LANES];
+                let at = dispatch::At { pixel: at, size };
+                let drawn: Vec<_> =
+                    parts.iter().filter_map(|(job, rays)| dispatch::draw(unit, job, rays, at, counts)).collect();
+                match drawn.as_slice() {
+                    [] => {}
+                    [one] => *pixels = one.clone(),
+                    several => self.in_depth_order(several, layers, at.pixel, pixels, counts),
                 }
             }
             Pass::General { layers } => {
-                for (l, zero) in zero.iter_mut().enumerate() {
-                    let (x, y) = (at[0] + l % SIDE, at[1] + l / SIDE);
-                    if x < size[0] && y < size[1] {
-                        let ray = self.grid.ray(x as f64 + 0.5, y as f64 + 0.5);
-                        let (end, threshold) = (self.settings.termination, f64::from(self.threshold));
-                        let result = general::draw(layers, &ray, &self.lattice, end, threshold, counts);
-                        pixels.color[l] = result.color.map(|v| v as f32);
-                        pixels.depth[l] = result.depth;
-                        *zero = ray.depth_zero;
-                    }
+                *zero = [self.grid.linear().depth_zero; LANES];
+                for l in 0..LANES {
+                    self.general(layers, at, l, pixels, counts);
                 }
             }
-            Pass::Reduce { job, rays, units, table, unit: distance } => {
+            Pass::Reduce(reduction) => {
+                let Reduction { job, rays, units, table, unit: distance } = reduction.as_ref();
                 let at = dispatch::At { pixel: at, size };
                 let Some(reduced) = dispatch::reduce(unit, job, rays, at, counts) else { return };
                 for (pixel, r) in pixels.color.iter_mut().zip(reduced) {
@@ -416,6 +483,58 @@ impl<'a> Picture<'a> {
                     }
                 }
             }
+        }
+    }
+}
+
+impl Picture<'_> {
+    /// Draws one lane the plain way.
+    fn general(
+        &self,
+        layers: &[general::Layer<'_>],
+        at: [usize; 2],
+        l: usize,
+        pixels: &mut over::Pixels,
+        counts: &mut Counts,
+    ) {
+        let (x, y) = (at[0] + l % SIDE, at[1] + l / SIDE);
+        if x < self.viewport.width && y < self.viewport.height {
+            let ray = self.grid.ray(x as f64 + 0.5, y as f64 + 0.5);
+            let (end, threshold) = (self.settings.termination, f64::from(self.threshold));
+            let result = general::draw(layers, &ray, &self.lattice, end, threshold, counts);
+            pixels.color[l] = result.color.map(|v| v as f32);
+            pixels.depth[l] = result.depth;
+        }
+    }
+
+    /// Puts shapes that are apart one behind the other along each ray.
+    fn in_depth_order(
+        &self,
+        drawn: &[over::Pixels],
+        layers: &[general::Layer<'_>],
+        at: [usize; 2],
+        pixels: &mut over::Pixels,
+        counts: &mut Counts,
+    ) {
+        for l in 0..LANES {
+            let mut order: Vec<&over::Pixels> = drawn.iter().filter(|p| p.start[l] < f64::INFINITY).collect();
+            order.sort_by(|a, b| a.start[l].total_cmp(&b.start[l]));
+            let (mut color, mut depth) = ([0f32; 4], f64::INFINITY);
+            for part in order {
+                let before = color[3];
+                color = over::under(color, part.color[l]);
+                if before < self.threshold && color[3] >= self.threshold {
+                    depth = if before == 0.0 { part.depth[l] } else { f64::NAN };
+                }
+            }
+            if depth.is_nan() {
+                // Reached inside a shape behind others: where, only the plain way tells.
+                let mut found = over::Pixels::default();
+                self.general(layers, at, l, &mut found, counts);
+                depth = found.depth[l];
+            }
+            pixels.color[l] = color;
+            pixels.depth[l] = depth;
         }
     }
 }

@@ -257,7 +257,9 @@ fn bound_layer(voxels: &Voxels<'_>, blocks: [usize; 3], bz: usize, [lo, hi]: [f3
                 255.0
             } else if b <= lo {
                 0.0
-            } else { (steps(b) + 1e-4).ceil().min(255.0) };
+            } else {
+                (steps(b) + 1e-4).ceil().min(255.0)
+            };
             *q = [low as u8, high as u8];
         }
     }

@@ -2,8 +2,8 @@
 //!
 //! - Midpoint lattice and exact exponential, or pre-integration where the table is too sharp for
 //!   the step and the data ([`sharp`]).
-//! - Sixteen rays at once on the widest vector unit found ([`simd`]); the same bits on every unit
-//!   and for any number of threads.
+//! - Sixteen rays at once on the widest vector unit found ([`simd`]); the same bits on every
+//!   unit with fused multiply-add, and for any number of threads.
 //! - Transparent space is skipped ([`bounds`]) and rays end when nothing is left to see; neither
 //!   skipping nor its absence changes a bit.
 //! - What the vector kernels do not do (overlapping shapes, pre-interpolated tables, `simple`) is

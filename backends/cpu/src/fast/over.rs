@@ -43,11 +43,13 @@ pub struct Pixels {
     pub color: [[f32; 4]; LANES],
     /// `t` at which the threshold is reached.
     pub depth: [f64; LANES],
+    /// `t` at which the ray enters the shape; infinite where it misses.
+    pub start: [f64; LANES],
 }
 
 impl Default for Pixels {
     fn default() -> Self {
-        Self { color: [[0.0; 4]; LANES], depth: [f64::INFINITY; LANES] }
+        Self { color: [[0.0; 4]; LANES], depth: [f64::INFINITY; LANES], start: [f64::INFINITY; LANES] }
     }
 }
 
@@ -58,6 +60,9 @@ impl Default for Pixels {
 #[inline(always)]
 pub unsafe fn draw<S: Simd, F: Fetch>(job: &Job<'_>, packet: &Packet, counts: &mut Counts) -> Pixels {
     let mut pixels = Pixels::default();
+    for l in 0..LANES {
+        pixels.start[l] = if packet.active >> l & 1 == 1 { packet.start[l] } else { f64::INFINITY };
+    }
     let cuts = packet.split(job.lattice.step);
     counts.rays += u64::from(packet.active.count_ones());
     counts.lattice += cuts.count();

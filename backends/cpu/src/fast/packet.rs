@@ -24,10 +24,12 @@ pub struct Place {
 }
 
 impl Place {
-    /// The place of a shape with a block and a volume.
+    /// The place of a shape with a block and a volume; `None` where nothing of the volume lies in
+    /// the block.
     pub fn new(shape: &ResolvedShape) -> Option<Self> {
         let to_index = shape.volume("volume")?.object_to_index();
-        Some(Self { to_object: shape.to_object, to_index, block: shape.block()? })
+        let block = shape.block().filter(|b| !b.is_empty())?;
+        Some(Self { to_object: shape.to_object, to_index, block })
     }
 }
 

@@ -4,7 +4,7 @@
 use std::{collections::BTreeMap, sync::Arc};
 
 use volact_core::{
-    Compositing, Roi, TableInterpolation, VolumeTexture,
+    Compositing, Roi, ScalarType, TableInterpolation, VolumeTexture,
     frame::Rebuild,
     glam::{DAffine3, DVec3},
     resolve::ResolvedShape,
@@ -26,10 +26,9 @@ struct BoundsKey {
     version: u64,
     component: usize,
     roi: [usize; 6],
+    /// Bits of the voxels' origin and gain, in which bounds are counted.
+    units: [u64; 2],
 }
-
-/// What a shape's emptiness depends on: its table (0 for none), its data, and how it is composited.
-type EmptyKey = (u64, BoundsKey, u64);
 
 /// What a shape's tables depend on.
 #[derive(Clone, Debug, PartialEq)]
@@ -53,6 +52,8 @@ pub struct Tables {
     pub table: SegmentTable,
     /// The same by pairs of values, where pre-integrated.
     pub pairs: Option<SegmentPairs>,
+    /// What can be skipped.
+    pub empty: Option<Emptiness>,
 }
 
 /// Everything kept.
@@ -60,8 +61,8 @@ pub struct Tables {
 pub struct Resources {
     bounds: BTreeMap<BoundsKey, Arc<ValueBounds>>,
     tables: BTreeMap<u64, Tables>,
-    /// By shape: what it depends on, and what can be skipped.
-    empty: BTreeMap<u64, (EmptyKey, Arc<Emptiness>)>,
+    /// By data: blocks of zeros, which add nothing to a sum.
+    zeros: BTreeMap<BoundsKey, Emptiness>,
     /// By data, and whether of the maximum.
     peaks: BTreeMap<(BoundsKey, bool), Peaks>,
 }
@@ -76,13 +77,13 @@ pub fn voxels<'a>(shape: &ResolvedShape, texture: &'a VolumeTexture) -> (Voxels<
     let desc = texture.volume().desc();
     let mut voxels = Voxels::new(texture, component(shape));
     let mut units = Units { scale: desc.slope, offset: desc.intercept };
-    let wide = matches!(desc.scalar, volact_core::ScalarType::F64)
-        || matches!(desc.scalar, volact_core::ScalarType::U32 | volact_core::ScalarType::I32);
+    let wide = matches!(desc.scalar, ScalarType::F64 | ScalarType::U32 | ScalarType::I32);
     if wide {
-        // f32 cannot hold these: fetch them relative to the range of the data instead. Not of the
-        // texture: an integer's is that of its type, in which data of a few hundreds is lost, and
-        // bounds are shared by all textures of a volume.
-        let [lo, hi] = texture.volume().value_range().unwrap_or([0.0, 1.0]);
+        // f32 cannot hold these: fetch them relative to the values that the table tells apart,
+        // whatever else there may be, or else to those that occur.
+        let points = shape.table("lookup_table").map(|t| t.points(texture.range()));
+        let span = points.and_then(|p| Some([p.first()?.value, p.last()?.value])).filter(|[a, b]| a < b);
+        let [lo, hi] = span.or_else(|| texture.volume().value_range()).unwrap_or([0.0, 1.0]);
         let (a, b) = ((lo - desc.intercept) / desc.slope, (hi - desc.intercept) / desc.slope);
         voxels.origin = a;
         voxels.gain = if a == b { 1.0 } else { 1.0 / (b - a) };
@@ -91,11 +92,23 @@ pub fn voxels<'a>(shape: &ResolvedShape, texture: &'a VolumeTexture) -> (Voxels<
     (voxels, units)
 }
 
-fn bounds_key(texture: &VolumeTexture, component: usize) -> BoundsKey {
+fn bounds_key(shape: &ResolvedShape, texture: &VolumeTexture) -> BoundsKey {
     let Roi { min, max } = texture.data_roi();
     let volume = texture.volume();
     let roi = [min[0], min[1], min[2], max[0], max[1], max[2]];
-    BoundsKey { volume: volume.id(), version: volume.version(), component, roi }
+    let voxels = voxels(shape, texture).0;
+    let units = [voxels.origin.to_bits(), voxels.gain.to_bits()];
+    BoundsKey { volume: volume.id(), version: volume.version(), component: component(shape), roi, units }
+}
+
+/// How a shape's numbers are reduced: a map to data units that falls makes a maximum of the
+/// values a minimum of the numbers.
+pub fn reduction(shape: &ResolvedShape, units: Units) -> Compositing {
+    match shape.compositing() {
+        Compositing::Maximum if units.scale < 0.0 => Compositing::Minimum,
+        Compositing::Minimum if units.scale < 0.0 => Compositing::Maximum,
+        other => other,
+    }
 }
 
 /// Samples a world unit along each axis of the data.
@@ -106,17 +119,22 @@ fn density(shape: &ResolvedShape, texture: &VolumeTexture) -> DVec3 {
 }
 
 impl Resources {
-    /// Prepares the shapes for a sample distance; says what was made anew.
+    /// Prepares the shapes for a sample distance; says what was made anew. `general` where `over`
+    /// shapes are drawn the plain way, which uses no pre-integration.
     pub fn prepare<'a>(
         &mut self,
         shapes: impl Iterator<Item = &'a ResolvedShape>,
         step: f64,
+        general: bool,
         settings: &Settings,
         rebuilt: &mut Vec<Rebuild>,
     ) {
+        // The plain way classifies by itself.
+        let post = Settings { classification: Classification::Post, ..*settings };
         for shape in shapes {
             let Some(texture) = shape.volume("volume") else { continue };
-            self.prepare_shape(shape, texture, step, settings, rebuilt);
+            let over = shape.compositing() == Compositing::Over;
+            self.prepare_shape(shape, texture, step, if general && over { &post } else { settings }, rebuilt);
         }
     }
 
@@ -126,20 +144,22 @@ impl Resources {
         let mut ids = Vec::new();
         for shape in shapes {
             ids.push(shape.id);
-            keys.extend(shape.volume("volume").map(|t| bounds_key(t, component(shape))));
+            keys.extend(shape.volume("volume").map(|t| bounds_key(shape, t)));
         }
         self.bounds.retain(|key, _| keys.contains(key));
         self.peaks.retain(|(key, _), _| keys.contains(key));
         self.tables.retain(|id, _| ids.contains(id));
-        self.empty.retain(|id, _| ids.contains(id));
+        self.zeros.retain(|key, _| keys.contains(key));
     }
 
     /// Bytes held.
     pub fn bytes(&self) -> usize {
-        let tables = |t: &Tables| t.table.bytes() + t.pairs.as_ref().map_or(0, SegmentPairs::bytes);
+        let pairs = |t: &Tables| t.pairs.as_ref().map_or(0, SegmentPairs::bytes);
+        let empty = |t: &Tables| t.empty.as_ref().map_or(0, Emptiness::bytes);
+        let tables = |t: &Tables| t.table.bytes() + pairs(t) + empty(t);
         self.bounds.values().map(|b| b.bytes()).sum::<usize>()
             + self.tables.values().map(tables).sum::<usize>()
-            + self.empty.values().map(|(_, e)| e.bytes()).sum::<usize>()
+            + self.zeros.values().map(Emptiness::bytes).sum::<usize>()
             + self.peaks.values().map(Peaks::bytes).sum::<usize>()
     }
 
@@ -148,21 +168,22 @@ impl Resources {
         self.tables.get(&id)
     }
 
-    /// What a shape can skip.
-    pub fn empty(&self, id: u64) -> Option<&Emptiness> {
-        self.empty.get(&id).map(|(_, e)| e.as_ref())
+    /// Blocks of zeros of a shape's data.
+    pub fn zeros(&self, shape: &ResolvedShape) -> Option<&Emptiness> {
+        self.zeros.get(&bounds_key(shape, shape.volume("volume")?))
     }
 
     /// Bounds of a shape's volume, where they were made.
     pub fn bounds(&self, shape: &ResolvedShape) -> Option<&ValueBounds> {
         let texture = shape.volume("volume")?;
-        self.bounds.get(&bounds_key(texture, component(shape))).map(Arc::as_ref)
+        self.bounds.get(&bounds_key(shape, texture)).map(Arc::as_ref)
     }
 
     /// The best that blocks of a shape's volume hold, where that was made.
     pub fn peaks(&self, shape: &ResolvedShape) -> Option<&Peaks> {
         let texture = shape.volume("volume")?;
-        self.peaks.get(&(bounds_key(texture, component(shape)), shape.compositing() == Compositing::Maximum))
+        let reduction = reduction(shape, voxels(shape, texture).1);
+        self.peaks.get(&(bounds_key(shape, texture), reduction == Compositing::Maximum))
     }
 
     fn prepare_shape(
@@ -177,7 +198,7 @@ impl Resources {
             log::debug!("{}: {what} made anew, {bytes} bytes", shape.name);
             rebuilt.push(Rebuild { shape: shape.name.clone(), what: what.into(), bytes });
         };
-        let key = bounds_key(texture, component(shape));
+        let key = bounds_key(shape, texture);
         let (voxels, units) = voxels(shape, texture);
         let compositing = shape.compositing();
         let table = shape.table("lookup_table");
@@ -195,32 +216,25 @@ impl Resources {
             None => None,
         };
         if compositing != Compositing::Over {
-            let maximum = compositing == Compositing::Maximum;
-            if let (Some(bounds), true) = (&bounds, maximum || compositing == Compositing::Minimum)
-                && !self.peaks.contains_key(&(key, maximum))
-            {
-                let peaks = bounds.peaks(maximum);
-                say("peaks", peaks.bytes());
-                self.peaks.insert((key, maximum), peaks);
-            }
-            if matches!(compositing, Compositing::Add | Compositing::Average) {
-                let zero = units.number(0.0) as f32;
-                let same = |k: &EmptyKey| *k == (0, key, 0);
-                match (&bounds, self.empty.get(&shape.id)) {
-                    (Some(_), Some((k, _))) if same(k) => {}
-                    (Some(bounds), _) if skips && zero == 0.0 => {
-                        let empty = bounds.emptiness(|lo, hi| lo != 0.0 || hi != 0.0);
-                        say("occupancy", empty.bytes());
-                        self.empty.insert(shape.id, ((0, key, 0), Arc::new(empty)));
-                    }
-                    _ => _ = self.empty.remove(&shape.id),
+            let reduction = reduction(shape, units);
+            let maximum = reduction == Compositing::Maximum;
+            let extreme = maximum || reduction == Compositing::Minimum;
+            if let Some(bounds) = bounds {
+                if extreme && !self.peaks.contains_key(&(key, maximum)) {
+                    let peaks = bounds.peaks(maximum);
+                    say("peaks", peaks.bytes());
+                    self.peaks.insert((key, maximum), peaks);
+                }
+                if !extreme && voxels.origin == 0.0 && !self.zeros.contains_key(&key) {
+                    let zeros = bounds.emptiness(|lo, hi| lo != 0.0 || hi != 0.0);
+                    say("occupancy", zeros.bytes());
+                    self.zeros.insert(key, zeros);
                 }
             }
             return;
         }
         let (Some(table), Some(unit)) = (table, shape.float("unit_distance")) else {
             self.tables.remove(&shape.id);
-            self.empty.remove(&shape.id);
             return;
         };
         let density = density(shape, texture);
@@ -287,13 +301,10 @@ impl Resources {
             None => !segments.sees(lo, hi),
         };
         let empty = bounds.filter(|_| settings.skipping).map(|b| b.emptiness(|lo, hi| !transparent(lo, hi)));
-        match empty.filter(Emptiness::any) {
-            Some(empty) => {
-                say("occupancy", empty.bytes());
-                self.empty.insert(shape.id, ((table.id(), key, 1), Arc::new(empty)));
-            }
-            None => _ = self.empty.remove(&shape.id),
+        let empty = empty.filter(Emptiness::any);
+        if let Some(empty) = &empty {
+            say("occupancy", empty.bytes());
         }
-        self.tables.insert(shape.id, Tables { key: wanted, table: segments, pairs });
+        self.tables.insert(shape.id, Tables { key: wanted, table: segments, pairs, empty });
     }
 }
