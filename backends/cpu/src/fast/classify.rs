@@ -93,7 +93,9 @@ impl SegmentTable {
         entries.extend([entries[count - 1], [0.0; 4], [0.0; 4]]);
         let offset = (-domain[0] * scale) as f32;
         let first = entries.iter().take(count).position(|e| e[3] > 0.0).unwrap_or(count + 1);
-        let dark = first as f32 - 1.0;
+        // Coordinates are compared before they are clamped: what the first node makes visible is so
+        // below it, too.
+        let dark = if first == 0 { f32::NEG_INFINITY } else { first as f32 - 1.0 };
         Self { entries, nodes: count, scale: scale as f32, offset, dark, error, domain, seen }
     }
 
