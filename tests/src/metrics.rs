@@ -1,6 +1,7 @@
 //! How far pictures lie apart, and how fast errors fall.
 
 use volact_core::Frame;
+use volact_cpu::reference::ReferencePicture;
 
 /// Premultiplied RGBA in f64, row by row from the top.
 pub type Picture = Vec<[f64; 4]>;
@@ -18,6 +19,18 @@ fn differences<'a>(a: &'a [[f64; 4]], b: &'a [[f64; 4]]) -> impl Iterator<Item =
 /// The largest difference in any channel of any pixel; infinite where one is not a number.
 pub fn max_error(a: &[[f64; 4]], b: &[[f64; 4]]) -> f64 {
     differences(a, b).fold(0.0, |m, d| if d.is_nan() { f64::INFINITY } else { m.max(d) })
+}
+
+/// How far any channel of any pixel lies outside what the reference encloses. Where rounding
+/// decides what a ray meets, as at a block's edge, the enclosure is wide and says nothing.
+pub fn outside(found: &[[f64; 4]], enclosure: &ReferencePicture) -> f64 {
+    assert_eq!(found.len(), enclosure.color.len(), "pictures of one size");
+    let channel = |i: usize, c: usize| {
+        let v = found[i][c];
+        if v.is_nan() { f64::INFINITY } else { (enclosure.lower[i][c] - v).max(v - enclosure.upper[i][c]).max(0.0) }
+    };
+    let all = (0..found.len()).flat_map(|i| (0..4).map(move |c| (i, c)));
+    all.map(|(i, c)| channel(i, c)).fold(0.0, f64::max)
 }
 
 /// The root of the mean square of the differences.

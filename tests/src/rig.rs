@@ -1,7 +1,7 @@
 //! Actions by name and option, and a picture in one call.
 
 use volact_core::{ActionError, Frame, FrameDesc, Options, ParameterValue, Registry, RenderAction, Shape};
-use volact_cpu::reference::{ReferenceOptions, ReferencePicture, integrate};
+use volact_cpu::reference::{Method, ReferenceOptions, ReferencePicture, integrate};
 
 use crate::metrics::{Picture, wide};
 
@@ -130,6 +130,15 @@ pub fn draw_managed(action: &mut dyn RenderAction, shapes: &[Shape], desc: &Fram
 /// If a shape or the frame is wrong.
 pub fn truth(shapes: &[Shape], desc: &FrameDesc) -> ReferencePicture {
     integrate_with(shapes, desc, &ReferenceOptions { threads: 2, ..ReferenceOptions::default() })
+}
+
+/// The reference's picture on the lattice of ray casting, with its enclosure.
+///
+/// # Panics
+/// If a shape or the frame is wrong.
+pub fn on_rays(shapes: &[Shape], desc: &FrameDesc, step: f64) -> ReferencePicture {
+    let options = ReferenceOptions { method: Method::Rays, sample_distance: step, threads: 2, ..Default::default() };
+    integrate_with(shapes, desc, &options)
 }
 
 /// Any picture of the reference in f64.

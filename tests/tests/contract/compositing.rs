@@ -177,8 +177,8 @@ fn three_coincident_blocks_are_one_of_three_times_the_extinction() {
     }
 }
 
-/// A shape that its user cuts in two agrees to second order: the cut segments have midpoints of
-/// their own.
+/// A shape that its user cuts in two agrees to second order at least: the cut segments have
+/// midpoints of their own. One cut changes one segment, whose own error is of third order.
 #[test]
 fn shape_cut_in_two_agrees_to_second_order() {
     let texture = VolumeTexture::new(&cell());
@@ -197,5 +197,5 @@ fn shape_cut_in_two_agrees_to_second_order() {
     });
     println!("{errors:?}");
     assert!(errors[0].1 > 1e-5, "the cut is seen at coarse steps: {errors:?}");
-    between("order", order(&errors), [1.7, 2.4]);
+    between("order", order(&errors), [2.0, 3.3]);
 }

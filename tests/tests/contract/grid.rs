@@ -104,6 +104,21 @@ fn geometry_roi_moves_and_scales_the_texture_and_meets_the_block() {
 }
 
 #[test]
+fn block_and_region_that_do_not_meet_show_nothing() {
+    let texture = VolumeTexture::new(&cell());
+    let table = greys(&[(0.0, 1.0, 0.5)]);
+    for shader in ["lut", "mip", "average", "xray"] {
+        let block = Block::new(DVec3::splat(1.5), DVec3::ONE).unwrap();
+        let look = volact_conformance::scene::look(shader, table.clone(), 1.0).with("volume", texture.clone());
+        let shape = Shape::new(block, look);
+        for setup in [Setup::exact(), Setup::rays(0.3), Setup::post(0.3)] {
+            let found = setup.colors(std::slice::from_ref(&shape), &oblique(12));
+            assert!(found.iter().all(|c| *c == [0.0; 4]), "{shader}, {setup:?}");
+        }
+    }
+}
+
+#[test]
 fn nearest_takes_the_nearest_sample() {
     let rule = |p: DVec3| (1.0 + p.x + 4.0 * p.z) / 32.0;
     let shape = probe(
@@ -151,9 +166,6 @@ fn slope_and_intercept_make_data_units() {
     for scalar in ScalarType::ALL {
         let desc = VolumeDesc { slope: -0.5, intercept: 70.0, ..VolumeDesc::new([4, 4, 4], scalar, 1) };
         let data = placed(desc, |p| (rule(p) - 70.0) / -0.5);
-        if matches!(scalar, ScalarType::I8 | ScalarType::U8) && data.value_range() != Some([20.0, 62.0]) {
-            assert!(data.value_range().is_some());
-        }
         let shape = lut(&data, greys(&[(20.0, 0.1, 0.0), (60.0, 0.9, 0.6)]), 1.0);
         let a = Setup::exact().colors(std::slice::from_ref(&shape), &oblique(8));
         let b = Setup::exact().colors(std::slice::from_ref(&plain), &oblique(8));
@@ -276,7 +288,7 @@ fn fine_data_on_a_large_offset_keeps_its_detail() {
     within("cpu", max_error(&Setup::post(0.2).colors(&shape, &oblique(10)), &wanted), 1e-5);
     let whole = [lut(
         &volume([5, 6, 7], ScalarType::U32, |p| 4e9 + (1000.0 * rule(p)).round()),
-        { greys(&[(4e9, 0.1, 0.0), (4e9 + 1000.0, 0.9, 0.7)]) },
+        greys(&[(4e9, 0.1, 0.0), (4e9 + 1000.0, 0.9, 0.7)]),
         1.0,
     )];
     let wanted = Setup::rays(0.2).colors(&whole, &oblique(10));

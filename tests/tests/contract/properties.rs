@@ -2,8 +2,8 @@
 
 use proptest::prelude::*;
 use volact_conformance::{
-    metrics::max_error,
-    rig::Setup,
+    metrics::outside,
+    rig::{Setup, on_rays},
     scene::{ball, colors, look, shaded},
 };
 use volact_core::{
@@ -47,9 +47,8 @@ fn map() -> impl Strategy<Value = DAffine3> {
 
 fn agree(shapes: &[Shape], camera: Camera, size: [usize; 2], step: f64) -> Result<(), TestCaseError> {
     let desc = FrameDesc::new(camera, size[0], size[1]);
-    let wanted = Setup::rays(step).colors(shapes, &desc);
     let found = Setup::post(step).colors(shapes, &desc);
-    let error = max_error(&found, &wanted);
+    let error = outside(&found, &on_rays(shapes, &desc, step));
     prop_assert!(error <= TOLERANCE, "{error:e}");
     Ok(())
 }
