@@ -262,7 +262,8 @@ fn wrapped(fault: fn(&mut Frame)) -> CheckedAction {
 fn checked_finds_a_faulty_action() {
     let shape = shape();
     let desc = view(&shape, View::Front);
-    let faults: [(fn(&mut Frame), &str); 7] = [
+    type Fault = fn(&mut Frame);
+    let faults: [(Fault, &str); 7] = [
         (|f| f.color[13] = [f32::NAN; 4], "pixel (1, 1)"),
         (|f| f.color[0] = [0.0, -0.1, 0.0, 0.5], "pixel (0, 0)"),
         (|f| f.color[12] = [0.0, 0.0, 0.0, 1.1], "pixel (0, 1)"),

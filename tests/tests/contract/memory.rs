@@ -37,7 +37,7 @@ fn check(volume: &Volume) {
 #[test]
 fn a_volume_of_bytes_costs_little_beside_itself() {
     let n = 256usize;
-    let bytes: Vec<u8> = (0..n * n * n).map(|i| ((i / n) % 251 ^ (i % n / 3)) as u8).collect();
+    let bytes: Vec<u8> = (0..n * n * n).map(|i| (((i / n) % 251) ^ (i % n / 3)) as u8).collect();
     check(&Volume::new(VolumeDesc::new([n; 3], ScalarType::U8, 1), bytes).unwrap());
 }
 
