@@ -81,10 +81,16 @@ impl CpuAction {
         })
     }
 
-    fn step(&self, shapes: &[&ResolvedShape]) -> Result<f64, ActionError> {
+    /// The sample distance for these shapes.
+    fn distance(&self, shapes: &[&ResolvedShape]) -> f64 {
         let voxel = |s: &&ResolvedShape| s.volume("volume").map(|t| smallest_voxel(t, &s.state.transform));
         let smallest = shapes.iter().filter_map(voxel).fold(f64::INFINITY, f64::min);
-        let step = self.settings.sample_distance.unwrap_or(if smallest.is_finite() { smallest / 2.0 } else { 1.0 });
+        self.settings.sample_distance.unwrap_or(if smallest.is_finite() { smallest / 2.0 } else { 1.0 })
+    }
+
+    /// The same, unless it is too small for one of them.
+    fn step(&self, shapes: &[&ResolvedShape]) -> Result<f64, ActionError> {
+        let step = self.distance(shapes);
         for shape in shapes {
             let size = shape.state.world_bounds().size().length();
             if size / step > MOST_SEGMENTS {
@@ -173,7 +179,11 @@ impl RenderAction for CpuAction {
         let shapes: Vec<ResolvedShape> = open.shapes.values().cloned().collect();
         let managed: Vec<_> = shapes.iter().collect();
         // What is drawn is not known yet: most likely what was drawn last, else everything.
-        let plan = match self.step(&managed) {
+        // Only a distance that was asked for can be refused already: the one chosen for all may be
+        // too small for some, and those not drawn together.
+        let asked = self.settings.sample_distance.is_some();
+        let step = if asked { self.step(&managed) } else { Ok(self.distance(&managed)) };
+        let plan = match step {
             Ok(step) => self.last.unwrap_or(Plan { step, general: uses_general(&managed) }),
             Err(error) => {
                 self.lifecycle.abandon();
