@@ -294,3 +294,35 @@ fn fine_data_on_a_large_offset_keeps_its_detail() {
     let wanted = Setup::rays(0.2).colors(&whole, &oblique(10));
     within("cpu, u32", max_error(&Setup::post(0.2).colors(&whole, &oblique(10)), &wanted), 1e-5);
 }
+
+/// What one texture makes of a volume is nothing to another: ranges differ, data is shared.
+#[test]
+fn textures_of_one_volume_with_ranges_of_their_own_do_not_meddle() {
+    let data = volume([9, 10, 11], ScalarType::F64, |p| (p.x - 4.0) * (p.y - 3.0) + p.z);
+    let table = || greys(&[(2.0, 0.1, 0.0), (9.0, 0.9, 0.5)]);
+    let texture = |range| VolumeTexture::new(&data).with_range(range).unwrap();
+    let shapes = [lut_of(&texture([0.0, 1.0]), table(), 1.0), lut_of(&texture([5.0, 4000.0]), table(), 1.0)];
+    let mut action = Setup::post(0.3).action();
+    shapes.iter().for_each(|s| action.manage(s).unwrap());
+    let wanted = Setup::rays(0.3).colors(&shapes[..1], &oblique(10));
+    for shape in &shapes {
+        let frame = volact_conformance::rig::draw_managed(&mut *action, std::slice::from_ref(shape), &oblique(10));
+        let found = volact_conformance::metrics::wide(&frame.unwrap());
+        within("own range", max_error(&found, &wanted), 1e-5);
+    }
+}
+
+/// A fill value far outside must not cost the data its detail.
+#[test]
+fn fill_values_leave_the_data_its_detail() {
+    for scalar in [ScalarType::F32, ScalarType::F64] {
+        let rule = |p: DVec3| if p.x == 6.0 { 1e30 } else { 0.5 + 0.4 * (p.x + 0.7 * p.y).sin() * p.z.cos() };
+        let table = greys(&[(0.0, 0.1, 0.0), (1.0, 0.9, 0.7), (1.0, 0.0, 0.0)]);
+        let shape = [lut(&volume([7, 6, 7], scalar, rule), table, 1.0)];
+        let wanted = Setup::rays(0.2).colors(&shape, &oblique(10));
+        let found = Setup::post(0.2).colors(&shape, &oblique(10));
+        // Samples next to the step between 1 and the fill value lie on one side or the other.
+        let wrong = (0..found.len()).filter(|&i| max_error(&found[i..=i], &wanted[i..=i]) > 1e-4).count();
+        within(&format!("fill values of {scalar}: pixels"), wrong as f64, 2.0);
+    }
+}

@@ -213,3 +213,17 @@ fn managed_but_not_drawn_changes_nothing() {
         }
     }
 }
+
+/// A shape that is managed and not drawn may be so small that its own voxels would be a step beyond
+/// all limits for the one that is drawn.
+#[test]
+fn managed_but_not_drawn_refuses_nothing() {
+    let tiny = lut(&volume([4, 4, 4], ScalarType::F32, |p| p.x), greys(&[(0.0, 1.0, 0.5)]), 1.0);
+    tiny.set_transform(DAffine3::from_scale(DVec3::splat(1e-9)));
+    let (_, shapes) = scenes().swap_remove(0);
+    let desc = &views(&shapes)[0];
+    let mut action = Setup::cpu().action();
+    action.manage(&tiny).unwrap();
+    let found = draw(&mut *action, &shapes, desc).unwrap_or_else(|e| panic!("refused: {e}"));
+    assert!(identical(&found, &Setup::cpu().draw(&shapes, desc)));
+}
