@@ -81,7 +81,7 @@ pub fn run(args: &Args) -> Result<()> {
     let stats = &frame.statistics;
     let ms = times[times.len() / 2];
     let row = json!({
-        "peer": format!("volact-{}", args.action), "scene": scene.name, "view": args.view, "step": args.step,
+        "action": args.action, "scene": scene.name, "view": args.view, "step": args.step,
         "size": args.size, "ms": round(ms), "ms_min": round(times[0]), "ms_max": round(times[times.len() - 1]),
         "frames": times.len(), "first_ms": round(first_ms), "cpu": round(busy), "peak_mib": peak_mib(),
         "classification": frame.method.classification, "device": frame.method.device,

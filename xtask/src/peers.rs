@@ -67,8 +67,6 @@ fn measure(args: &Args) -> Result<()> {
     // Beside the same distance, one for each peer that another setting must answer.
     let others = [
         with("volact", "{step}", ""),
-        with("volact-post", "{step}", " --option classification=post"),
-        with("volact-pre", "{step}", " --option classification=pre-integrated"),
         with("volact-1-thread", "{step}", " --option threads=1"),
         with("volact-step-2", "2", ""),
         with("volact-step-4", "4", ""),
@@ -76,7 +74,11 @@ fn measure(args: &Args) -> Result<()> {
     ];
     let mut command = Command::new(&args.python);
     command.current_dir(&peers).arg("run_all.py").arg("--scenes").args(SCENES);
-    command.args(["--rounds", &args.rounds.to_string(), "--log"]).arg(&log).arg("--with").args(&others);
+    command
+        .args(["--budget", "1.2", "--rounds", &args.rounds.to_string(), "--log"])
+        .arg(&log)
+        .arg("--with")
+        .args(&others);
     let status = command.status().with_context(|| format!("{}: cannot be run", args.python.display()))?;
     if !status.success() {
         bail!("the peers' driver failed: {status}");
