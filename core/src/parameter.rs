@@ -267,7 +267,7 @@ impl ParameterDecl {
         if let (Some([lo, hi]), Some(v)) = (self.bounds, value.as_float())
             && !(lo <= v && v <= hi)
         {
-            return Err(problem(format!("{lo} to {hi}")));
+            return Err(problem(range(lo, hi)));
         }
         if let ParameterValue::Choice(word) = &value
             && !self.choices.is_empty()
@@ -281,6 +281,16 @@ impl ParameterDecl {
 
     fn takes(&self, kind: ParameterType) -> bool {
         self.types.contains(&kind)
+    }
+}
+
+/// Bounds in words: the smallest and largest numbers stand for none.
+pub fn range(lo: f64, hi: f64) -> String {
+    match (lo == f64::MIN_POSITIVE, hi == f64::MAX) {
+        (true, true) => "a number above 0".to_owned(),
+        (true, false) => format!("above 0 and at most {hi}"),
+        (false, true) => format!("at least {lo}"),
+        (false, false) => format!("{lo} to {hi}"),
     }
 }
 

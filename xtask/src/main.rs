@@ -4,6 +4,7 @@ mod check;
 mod peer;
 mod peer_scene;
 mod peers;
+mod scaling;
 
 use clap::{Parser, Subcommand};
 
@@ -24,6 +25,8 @@ enum Task {
     Peer(peer::Args),
     /// Compare with other renderers in one run, interleaved, and write the tables.
     Peers(peers::Args),
+    /// Time `cpu` over picture sizes, volume sizes and threads.
+    Scaling,
 }
 
 fn main() -> anyhow::Result<()> {
@@ -32,5 +35,6 @@ fn main() -> anyhow::Result<()> {
         Task::Check => check::all(),
         Task::Peer(args) => peer::run(&args),
         Task::Peers(args) => peers::run(&args),
+        Task::Scaling => scaling::run(),
     }
 }

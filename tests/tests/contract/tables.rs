@@ -26,10 +26,8 @@ fn tables_of_any_number_of_entries_equal_their_points() {
     [1usize, 2, 3, 7, 255, 256].into_iter().for_each(entries_equal_their_points);
 }
 
-/// Open: `cpu` tabulates segments at 8192 nodes at most, which is too few where each of thousands of
-/// entries differs wholly from the next.
+/// Each of thousands of entries differs wholly from the next: `cpu` needs as many nodes, and more.
 #[test]
-#[should_panic(expected = "4097 entries, cpu against rays")]
 fn jagged_table_of_thousands_of_entries() {
     entries_equal_their_points(4097);
 }

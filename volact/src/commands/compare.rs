@@ -29,19 +29,19 @@ pub struct Args {
     /// The picture wanted
     b: PathBuf,
     /// Exit with 1 where a channel differs by more than this (0.004 is about one step of 8 bits)
-    #[arg(long, value_name = "DIFFERENCE")]
+    #[arg(long, value_name = "DIFFERENCE", value_parser = threshold)]
     max: Option<f64>,
     /// Exit with 1 where the root of the mean square difference is above this
-    #[arg(long, value_name = "DIFFERENCE")]
+    #[arg(long, value_name = "DIFFERENCE", value_parser = threshold)]
     rmse: Option<f64>,
     /// Exit with 1 where the peak signal-to-noise ratio is below this many decibels
-    #[arg(long, value_name = "DB")]
+    #[arg(long, value_name = "DB", value_parser = threshold)]
     psnr: Option<f64>,
     /// Exit with 1 where the structural similarity is below this (1 for equal pictures)
-    #[arg(long, value_name = "SIMILARITY")]
+    #[arg(long, value_name = "SIMILARITY", value_parser = threshold)]
     ssim: Option<f64>,
     /// Exit with 1 where the mean FLIP is above this (0 for equal pictures)
-    #[arg(long, value_name = "FLIP")]
+    #[arg(long, value_name = "FLIP", value_parser = threshold)]
     flip: Option<f64>,
     /// Write a picture of the differences: FLIP, black where none is seen to yellow
     #[arg(long, value_name = "FILE.png")]
@@ -66,6 +66,14 @@ pub fn run(args: Args, _: &Registry) -> anyhow::Result<ExitCode> {
     let text = if args.json { to_json(&found, &passed) } else { to_text(&found, &passed) };
     super::print(&text)?;
     Ok(ExitCode::from(u8::from(!passed.is_empty())))
+}
+
+/// A threshold: a number.
+fn threshold(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(v) if !v.is_nan() => Ok(v),
+        _ => Err(format!("{text:?} is no number")),
+    }
 }
 
 impl Args {

@@ -72,8 +72,20 @@ impl Args {
         if let Some(folder) = folder.filter(|p| !p.is_dir()) {
             bail!("{}: the folder {} is not there", output.display(), folder.display());
         }
+        if output.is_dir() {
+            bail!("{}: is a folder, wanted a file for the picture", output.display());
+        }
+        if overwrites(&self.source.input, output) {
+            bail!("{}: is what is drawn from; give the picture another name with -o", output.display());
+        }
         Ok(PngOptions { over_background: !self.straight_alpha, sixteen_bit: self.sixteen_bit })
     }
+}
+
+/// Whether an output is the input, or one of its series.
+fn overwrites(input: &Path, output: &Path) -> bool {
+    let (Ok(input), Ok(output)) = (input.canonicalize(), output.canonicalize()) else { return false };
+    output == input || (input.is_dir() && output.parent() == Some(&input))
 }
 
 /// Extensions of inputs, those of compressed files first.

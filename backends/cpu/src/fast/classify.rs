@@ -11,7 +11,7 @@ use volact_core::table::ResolvedTable;
 const WANTED_ERROR: f64 = 1e-6;
 /// Most intervals that are tried.
 const MOST: usize = 1 << 16;
-/// Most intervals for accuracy alone.
+/// Most intervals for accuracy where nodes miss control points anyway.
 const ENOUGH: usize = 1 << 13;
 
 /// From the numbers that kernels fetch to data units, and back.
@@ -69,7 +69,8 @@ impl SegmentTable {
             intervals *= 2;
         }
         let (mut nodes, mut error) = tabulate(&segment, domain, intervals);
-        while error > WANTED_ERROR && intervals < ENOUGH {
+        let most = if base.is_some() { MOST } else { ENOUGH };
+        while error > WANTED_ERROR && intervals * 2 <= most {
             intervals *= 2;
             (nodes, error) = tabulate(&segment, domain, intervals);
         }
@@ -175,11 +176,22 @@ fn domain(table: &ResolvedTable, units: Units, occurring: Option<[f64; 2]>) -> [
         lo = lo.max(clip(a, below).min(hi));
         hi = hi.min(clip(b, above).max(lo));
     }
-    [lo, hi]
+    beyond_steps(table, units, occurring, [lo, hi])
+}
+
+/// Widens a domain that ends at a step, so that both sides of the step have nodes.
+fn beyond_steps(table: &ResolvedTable, units: Units, occurring: Option<[f64; 2]>, [lo, hi]: [f64; 2]) -> [f64; 2] {
+    let points = table.points();
+    let step = |at: f64| points.windows(2).any(|p| p[0].value == p[1].value && units.number(p[0].value) == at);
+    let span = occurring.map_or(0.0, |[a, b]| b - a).max(hi - lo);
+    // A whole number keeps nodes on whole numbers.
+    let width = if span >= 64.0 { (span / 2048.0).ceil() } else { span.max(f64::MIN_POSITIVE) / 64.0 };
+    let width = if span > 0.0 { width } else { lo.abs().max(1.0) };
+    [if step(lo) { lo - width } else { lo }, if step(hi) { hi + width } else { hi }]
 }
 
 /// The fewest intervals over `domain` whose nodes meet all marks.
-fn aligned(marks: &[f64], [lo, hi]: [f64; 2]) -> Option<usize> {
+pub fn aligned(marks: &[f64], [lo, hi]: [f64; 2]) -> Option<usize> {
     if lo >= hi {
         return Some(1);
     }

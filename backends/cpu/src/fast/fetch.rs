@@ -78,7 +78,8 @@ impl<'a> Voxels<'a> {
         let [nx, ny, _] = self.dims;
         let reach = self.bytes.len() <= i32::MAX as usize && self.bytes.len() >= 4 && nx.max(ny) < 1 << 20;
         let pairs = self.max[0] > self.min[0] || self.scalar == ScalarType::F32;
-        if self.components != 1 || self.nearest || !reach || !pairs {
+        let stored = self.origin == 0.0 && self.gain == 1.0;
+        if self.components != 1 || self.nearest || !reach || !pairs || !stored {
             return Access::Scattered;
         }
         match self.scalar {

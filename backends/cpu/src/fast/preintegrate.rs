@@ -9,7 +9,7 @@
 //! Its colour is K̄ (1 − e⁻ᵀ)/T − (m − K̄T/2) g(T), exact where colour is linear in optical depth,
 //! with g(T) = 12 (T/2 (1 − e⁻ᵀ) − 1 + e⁻ᵀ(1 + T)) / T³. Segments of some depth are cut first.
 
-use super::classify::{SegmentTable, Units};
+use super::classify::{SegmentTable, Units, aligned};
 use volact_core::table::ResolvedTable;
 
 /// Optical depth of one piece.
@@ -47,15 +47,24 @@ impl SegmentPairs {
         ((bytes / 16) as f64).sqrt() as usize - 2
     }
 
-    /// Tabulates `table` for segments of `h` unit distances on the grid of `fine`, made coarser
-    /// until it has at most `most` nodes.
-    pub fn new(table: &ResolvedTable, units: Units, fine: &SegmentTable, h: f64, most: usize, threads: usize) -> Self {
-        let all = fine.nodes - 1;
-        // The finest grid that is a part of the fine one keeps its nodes on the control points.
-        let share = (1..=all.max(1)).find(|d| all.is_multiple_of(*d) && all / d < most && all / d >= most / 3);
-        let intervals = share.map_or(all.min(most - 1), |d| all / d).max(1);
+    /// Tabulates `table` for segments of `h` unit distances with at most `most` nodes. The grid
+    /// spans the domain of `fine` and all numbers that occur: a segment that begins or ends beyond
+    /// the table's own values is inside them for a part of its length only.
+    pub fn new(
+        table: &ResolvedTable,
+        units: Units,
+        (fine, occurring): (&SegmentTable, Option<[f64; 2]>),
+        h: f64,
+        most: usize,
+        threads: usize,
+    ) -> Self {
+        let [a, b] = occurring.unwrap_or(fine.domain);
+        let [lo, hi] = [fine.domain[0].min(a), fine.domain[1].max(b)];
+        let marks: Vec<f64> = table.points().iter().map(|p| units.number(p.value)).collect();
+        // The finest grid with its nodes on the control points, where one has so few.
+        let base = if lo < hi { aligned(&marks, [lo, hi]).filter(|&n| n < most) } else { Some(1) };
+        let intervals = base.map_or(most - 1, |n| n * ((most - 1) / n)).max(1);
         let nodes = intervals + 1;
-        let [lo, hi] = fine.domain;
         let width = (hi - lo) / intervals as f64;
         let cumulative = antiderivatives(table, units, [lo, width], nodes);
         let diagonal: Vec<[f64; 4]> = (0..nodes).map(|i| density(table, units.data(lo + i as f64 * width))).collect();
@@ -238,7 +247,7 @@ mod tests {
         let units = Units { scale: 1.0, offset: 0.0 };
         for h in [0.5, 2.0, 8.0] {
             let fine = SegmentTable::new(&table, units, None, h);
-            let pairs = SegmentPairs::new(&table, units, &fine, h, 401, 2);
+            let pairs = SegmentPairs::new(&table, units, (&fine, None), h, 401, 2);
             for (from, to) in [(0.0, 100.0), (100.0, 0.0), (30.0, 60.0), (47.0, 41.0), (44.0, 44.0), (80.0, 20.0)] {
                 let (got, want) = (pairs.lookup(from as f32, to as f32), truth(&table, from, to, h));
                 for c in 0..4 {
@@ -247,6 +256,17 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn segment_through_a_narrow_table_counts_the_part_inside() {
+        let p = |value, opacity| ControlPoint { value, color: [1.0; 3], opacity };
+        let table = LookupTable::from_points([p(50.0, 0.0), p(55.0, 0.5), p(60.0, 0.0)]).unwrap().resolve([0.0, 1.0]);
+        let units = Units { scale: 1.0, offset: 0.0 };
+        let fine = SegmentTable::new(&table, units, Some([0.0, 200.0]), 1.0);
+        let pairs = SegmentPairs::new(&table, units, (&fine, Some([0.0, 200.0])), 1.0, 401, 1);
+        let (got, want) = (pairs.lookup(0.0, 200.0), truth(&table, 0.0, 200.0, 1.0));
+        assert!((f64::from(got[3]) - want[3]).abs() < 1e-4, "{got:?} {want:?}");
     }
 
     #[test]

@@ -78,16 +78,19 @@ pub fn voxels<'a>(shape: &ResolvedShape, texture: &'a VolumeTexture) -> (Voxels<
     let mut voxels = Voxels::new(texture, component(shape));
     let mut units = Units { scale: desc.slope, offset: desc.intercept };
     let wide = matches!(desc.scalar, ScalarType::F64 | ScalarType::U32 | ScalarType::I32);
-    if wide {
+    if wide || desc.scalar.is_float() {
         // f32 cannot hold these: fetch them relative to the values that the table tells apart,
-        // whatever else there may be, or else to those that occur.
+        // whatever else there may be, or else to those that occur. Nor can it place floats of
+        // extreme size on a table.
         let points = shape.table("lookup_table").map(|t| t.points(texture.range()));
         let span = points.and_then(|p| Some([p.first()?.value, p.last()?.value])).filter(|[a, b]| a < b);
         let [lo, hi] = span.or_else(|| texture.volume().value_range()).unwrap_or([0.0, 1.0]);
         let (a, b) = ((lo - desc.intercept) / desc.slope, (hi - desc.intercept) / desc.slope);
-        voxels.origin = a;
-        voxels.gain = if a == b { 1.0 } else { 1.0 / (b - a) };
-        units = Units { scale: desc.slope / voxels.gain, offset: lo };
+        if wide || !(1e-30..1e30).contains(&(b - a).abs()) {
+            voxels.origin = a;
+            voxels.gain = if a == b { 1.0 } else { 1.0 / (b - a) };
+            units = Units { scale: desc.slope / voxels.gain, offset: lo };
+        }
     }
     (voxels, units)
 }
@@ -252,40 +255,37 @@ impl Resources {
             return;
         }
         let resolved = table.resolve(texture.range());
-        let occurring = match &bounds {
-            Some(b) => b.range.map(|r| r.map(f64::from)).filter(|_| !voxels.scalar.is_float()),
-            // The same without skipping, so that tables and picture are the same.
-            None if voxels.scalar.is_float() => None,
-            None => number_range(&voxels, settings.threads).map(|r| r.map(f64::from)),
-        };
+        // The same with and without skipping, so that tables and picture are the same.
+        let range = bounds.as_ref().map_or_else(|| number_range(&voxels, settings.threads), |b| b.range);
+        let range = range.map(|r| r.map(f64::from));
+        // Floats may be infinite: then the table's own ends count.
+        let occurring = range.filter(|_| !voxels.scalar.is_float());
         let h = step / unit;
         let segments = SegmentTable::new(&resolved, units, occurring, h);
         say("classification", segments.bytes());
         let fits = table.interpolation() == TableInterpolation::Post && !voxels.nearest;
-        let sharp = || sharp::estimate(&voxels, &resolved, &segments, units, h, density * step);
-        let pre = fits
-            && match settings.classification {
-                Classification::Post => false,
-                Classification::PreIntegrated => true,
-                Classification::Auto => {
-                    let estimate = sharp();
-                    log::debug!("{}: estimated errors by classification {estimate:?}", shape.name);
-                    estimate.too_sharp()
-                }
-            };
-        let pairs = pre.then(|| {
-            let budget = (voxels.bytes.len() / 10).max(5 << 19);
-            let pairs = SegmentPairs::new(
-                &resolved,
-                units,
-                &segments,
-                h,
-                SegmentPairs::most_nodes(budget).min(1024),
-                settings.threads,
-            );
+        let estimate = |pairs: Option<&SegmentPairs>| {
+            sharp::estimate(&voxels, &resolved, (&segments, pairs), units, h, density * step)
+        };
+        let asked = fits && settings.classification != Classification::Post;
+        let first = if asked { estimate(None) } else { sharp::Estimate::default() };
+        let forced = settings.classification == Classification::PreIntegrated;
+        let wanted_pairs = asked && (forced || first.matters());
+        // As far beyond the table's own values as a segment reaches; farther would cost nodes.
+        let reach = |[a, b]: [f64; 2]| {
+            let whole = [a, b].iter().chain(&segments.domain).all(|v| v.fract() == 0.0);
+            let change = if whole { (1.5 * first.change).ceil() } else { 1.5 * first.change };
+            [a.max(segments.domain[0] - change), b.min(segments.domain[1] + change)]
+        };
+        let range = range.map(reach).filter(|[a, b]| a <= b);
+        let budget = (voxels.bytes.len() / 10).max(5 << 19);
+        let most = SegmentPairs::most_nodes(budget).min(1024);
+        let pairs = wanted_pairs
+            .then(|| SegmentPairs::new(&resolved, units, (&segments, range), h, most, settings.threads))
+            .filter(|pairs| forced || estimate(Some(pairs)).helps());
+        if let Some(pairs) = &pairs {
             say("pre-integration", pairs.bytes());
-            pairs
-        });
+        }
         let transparent = |lo: f32, hi: f32| match &pairs {
             // The coarser grid of pairs reaches farther around a value.
             Some(pairs) => {

@@ -10,6 +10,7 @@ use volact_core::{glam::DVec3, table::ResolvedTable};
 use super::{
     classify::{SegmentTable, Units, segment},
     fetch::Voxels,
+    preintegrate::SegmentPairs,
 };
 
 /// Parts of a segment.
@@ -26,28 +27,36 @@ pub struct Estimate {
     pub post: f64,
     /// Pre-integrated.
     pub pre: f64,
+    /// The largest change of the number along a segment that can be seen.
+    pub change: f64,
 }
 
 impl Estimate {
-    /// Whether to pre-integrate: where it matters, and helps.
-    pub fn too_sharp(self) -> bool {
-        self.post > LIMIT && self.pre < 0.8 * self.post
+    /// Whether the error in the middle of segments matters.
+    pub fn matters(self) -> bool {
+        self.post > LIMIT
+    }
+
+    /// Whether pre-integration is better by more than the estimate's own uncertainty.
+    pub fn helps(self) -> bool {
+        self.pre < 0.8 * self.post
     }
 }
 
-/// Estimates the errors for segments of `h` unit distances and `step` samples along each axis.
+/// Estimates the errors for segments of `h` unit distances and `step` samples along each axis;
+/// that of pre-integration for the pairs given.
 /// Errors of segments are taken as independent: they add up along a ray by the square root.
 pub fn estimate(
     voxels: &Voxels<'_>,
     table: &ResolvedTable,
-    fine: &SegmentTable,
+    (fine, pairs): (&SegmentTable, Option<&SegmentPairs>),
     units: Units,
     h: f64,
     step: DVec3,
 ) -> Estimate {
     let size: [f64; 3] = std::array::from_fn(|a| (voxels.max[a] - voxels.min[a]) as f64);
     let mut seen = 0usize;
-    let (mut post, mut pre, mut opacity) = (0f64, 0f64, 0f64);
+    let (mut post, mut pre, mut opacity, mut change) = (0f64, 0f64, 0f64, 0f64);
     for n in 0..PLACES {
         // Additive recurrence with the plastic number in three dimensions (Roberts 2018).
         let at = |a: usize, g: f64| voxels.min[a] as f64 + (0.5 + g * (n + 1) as f64).fract() * size[a];
@@ -65,13 +74,13 @@ pub fn estimate(
         }
         let classify = |v: f64| table.classify(units.data(v));
         let exact = composite(|i| classify(f64::from(along[i])), h);
-        let (front, back) = (f64::from(front), f64::from(back));
-        let linear = composite(|i| classify(0.5 * (front + back) + 0.5 * part(i) * (back - front)), h);
+        let linear = pairs.map_or([0.0; 4], |p| p.lookup(front, back).map(f64::from));
         let whole = segment(classify(f64::from(middle)), h);
         let error = |e: [f64; 4]| (0..4).map(|c| (e[c] - exact[c]).powi(2)).fold(0.0, f64::max);
         post += error(whole);
         pre += error(linear);
         opacity += exact[3];
+        change = change.max(f64::from(hi) - f64::from(lo));
         seen += 1;
     }
     if seen == 0 {
@@ -83,7 +92,7 @@ pub fn estimate(
     let opaque = seen as f64 / opacity.max(1e-9);
     let count = (along * seen as f64 / PLACES as f64).min(opaque).max(1.0);
     let pixel = |square: f64| (square / seen as f64 * count).sqrt();
-    Estimate { post: pixel(post), pre: pixel(pre) }
+    Estimate { post: pixel(post), pre: pixel(pre), change }
 }
 
 /// A segment of equal parts, each with its colour and opacity.

@@ -93,6 +93,11 @@ impl Medium {
         table.chain(bounded).fold(1.0, f64::max)
     }
 
+    /// Whether opacity may be 1 anywhere.
+    pub fn can_be_opaque(&self) -> bool {
+        self.table.as_ref().is_none_or(|t| t.points().iter().any(|p| p.opacity >= 1.0))
+    }
+
     /// Whether values are those of the nearest sample.
     pub fn is_nearest(&self) -> bool {
         self.texture.filter() == Filter::Nearest

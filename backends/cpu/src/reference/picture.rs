@@ -183,6 +183,8 @@ impl Scene<'_> {
         for shape in self.shapes {
             match shape.place.meet(&ray) {
                 Hit::Miss => {}
+                // What is nowhere opaque adds nothing over no length.
+                Hit::Graze if shape.compositing == Compositing::Over && !shape.medium.can_be_opaque() => {}
                 Hit::Graze => {
                     pixel.met = true;
                     grazed = Some(shape.medium.brightest().max(grazed.unwrap_or(0.0)));
