@@ -1,6 +1,6 @@
 //! The `checked` action: wraps any other and verifies order and parameters, both ways.
 //!
-//! It repeats every check of [`Lifecycle`](crate::lifecycle::Lifecycle) around an action that may
+//! It repeats every check of [`Lifecycle`] around an action that may
 //! not make them (a stranger's plugin), and checks what comes back: a frame of the size asked for
 //! with finite, premultiplied colours. Name it in a config: `action: "checked", options: {"of": "cpu"}`.
 

@@ -1,6 +1,6 @@
 //! Two render actions on the CPU.
 //!
-//! - [`reference`]: f64, cell by cell, with an enclosure for each pixel. Slow, plain and right.
+//! - [`mod@reference`]: f64, cell by cell, with an enclosure for each pixel. Slow, plain and right.
 //! - [`fast`]: the action `cpu`: f32, all cores, the widest vector unit found.
 
 pub mod fast;
