@@ -5,7 +5,7 @@ use std::time::Duration;
 use glam::DVec3;
 use thiserror::Error;
 
-use crate::{Aabb, Camera, Shape, View, Warning, camera::CameraError};
+use crate::{Aabb, Camera, Clip, Opaque, Shape, View, Warning, camera::CameraError};
 
 /// A rectangle of pixels; row 0 is at the top.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,6 +35,10 @@ pub struct FrameDesc {
     pub background: [f32; 4],
     /// Accumulated opacity at which depth is taken, above 0 and at most 1.
     pub depth_threshold: f32,
+    /// What cuts all shapes, in world space.
+    pub clip: Clip,
+    /// What the application has drawn already and volumes lie before, behind and around.
+    pub opaque: Option<Opaque>,
 }
 
 /// The most pixels of a frame.
@@ -81,7 +85,7 @@ impl FrameDesc {
     /// A picture over black through a camera.
     pub fn new(camera: Camera, width: usize, height: usize) -> Self {
         let background = [0.0, 0.0, 0.0, 1.0];
-        Self { width, height, viewport: None, camera, background, depth_threshold: 0.5 }
+        Self { width, height, viewport: None, camera, background, depth_threshold: 0.5, clip: Clip::NONE, opaque: None }
     }
 
     /// A picture over black that shows the whole shape.
@@ -99,6 +103,18 @@ impl FrameDesc {
     /// Sets the background: straight red, green, blue and opacity.
     pub fn with_background(mut self, background: [f32; 4]) -> Self {
         self.background = background;
+        self
+    }
+
+    /// Sets what cuts all shapes, in world space.
+    pub fn with_clip(mut self, clip: Clip) -> Self {
+        self.clip = clip;
+        self
+    }
+
+    /// Sets what the application has drawn already.
+    pub fn with_opaque(mut self, opaque: Opaque) -> Self {
+        self.opaque = Some(opaque);
         self
     }
 
@@ -135,7 +151,7 @@ impl FrameDesc {
             });
         }
         self.camera.rays(&v)?;
-        Ok(())
+        self.opaque.as_ref().map_or(Ok(()), |opaque| opaque.validate(width, height))
     }
 }
 

@@ -7,6 +7,7 @@
 //! This crate knows no backend, no GPU and no file format; everything else depends on it.
 
 pub mod action;
+pub mod attribute;
 pub mod bulk;
 pub mod camera;
 pub mod checked;
@@ -16,8 +17,11 @@ pub mod geometry;
 pub mod lattice;
 pub mod lifecycle;
 pub mod loader;
+pub mod mesh_data;
 pub mod names;
+
 pub mod null;
+pub mod opaque;
 pub mod parameter;
 pub mod registry;
 pub mod resolve;
@@ -30,12 +34,18 @@ pub mod volume;
 pub mod warning;
 
 pub use action::{ActionError, Caps, Context, Options, RenderAction};
+pub use attribute::Attribute;
 pub use bulk::{Buffer, Bulk};
 pub use camera::{Camera, Projection, Ray, RayGrid, View};
 pub use frame::{Frame, FrameDesc, Method, Statistics, Viewport};
-pub use geometry::{Aabb, Block, Geometry, Tessellation};
+pub use geometry::{
+    Aabb, Block, CellType, CellTypes, Clip, ClipRegion, Cylinder, Geometry, Mesh, Plane, Points, SliceStyle, Sliced,
+    Slices, Sphere, StructuredMesh, Surface, Tessellation,
+};
 pub use glam;
 pub use loader::{LoadError, LoadOptions, Loader, Progress, Region, VolumeReader};
+pub use mesh_data::{Data, MeshData};
+pub use opaque::{Opaque, OpaqueDepth};
 pub use parameter::{Declaration, ParameterDecl, ParameterType, ParameterValue};
 pub use registry::Registry;
 pub use shader::{Compositing, ShaderEntry};

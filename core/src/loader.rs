@@ -1,4 +1,4 @@
-//! Loaders: from files to volumes, whole or region by region.
+//! Loaders: from files to volumes, whole or region by region, and to meshes and surfaces.
 //!
 //! A [`Loader`] is found by name or chosen by content: [`Loader::probe`] looks at the first bytes
 //! and at the path. [`Loader::open`] reads headers only and checks sizes against the files before
@@ -16,7 +16,7 @@ use std::{
 
 use thiserror::Error;
 
-use crate::{Buffer, Declaration, Roi, Volume, VolumeDesc, Warning, parameter::ParameterMap};
+use crate::{Buffer, Declaration, MeshData, Roi, Volume, VolumeDesc, Warning, parameter::ParameterMap};
 
 /// Options of a load, as the loader declares them.
 pub type LoadOptions = ParameterMap;
@@ -178,6 +178,22 @@ pub enum LoadError {
         /// Why.
         source: crate::volume::VolumeError,
     },
+    /// The mesh that the file describes cannot be.
+    #[error("{}: describes no mesh", path.display())]
+    Geometry {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: crate::geometry::GeometryError,
+    },
+    /// Numbers that do not go with the mesh's vertices.
+    #[error("{}: holds an attribute that cannot be", path.display())]
+    Attribute {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: crate::attribute::AttributeError,
+    },
 }
 
 impl LoadError {
@@ -223,11 +239,36 @@ pub trait Loader: Send + Sync + 'static {
     /// How sure it is that a file is its own, from the first bytes and the path alone.
     fn probe(&self, probe: &Probe<'_>) -> Confidence;
 
-    /// Reads the headers. `options` are checked against the declaration, defaults filled in.
+    /// What its files hold.
+    fn content(&self) -> Content {
+        Content::Volume
+    }
+
+    /// Reads the headers of a volume. `options` are checked against the declaration, defaults filled in.
     ///
     /// # Errors
     /// If the file is damaged, unsupported, or its parts have not the promised sizes.
     fn open(&self, path: &Path, options: &LoadOptions) -> Result<Box<dyn VolumeReader>, LoadError>;
+
+    /// Reads a mesh or surface. `options` are checked against the declaration, defaults filled in.
+    ///
+    /// # Errors
+    /// If the file is damaged, unsupported or shorter than promised, what it describes is no mesh,
+    /// or `progress` asks to stop.
+    fn read_mesh(&self, path: &Path, _options: &LoadOptions, _progress: &dyn Progress) -> Result<MeshData, LoadError> {
+        let what = format!("a mesh by loader {:?}", self.declaration().name);
+        Err(LoadError::Unsupported { path: path.into(), what, cure: "it reads volumes".into() })
+    }
+}
+
+/// What a loader's files hold.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Content {
+    /// Voxels: [`Loader::open`] reads them.
+    #[default]
+    Volume,
+    /// Meshes or surfaces: [`Loader::read_mesh`] reads them.
+    Mesh,
 }
 
 /// Opens `path` with the loader that is surest of it. A tie goes to the first registered.
@@ -266,15 +307,43 @@ pub fn load(
     options: &LoadOptions,
     progress: &dyn Progress,
 ) -> Result<Volume, LoadError> {
-    let declaration = loader.declaration();
-    let options = declaration.resolve(options, |_| false).map_err(|problems| LoadError::Options {
-        loader: declaration.name.clone(),
-        problem: problems.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "),
-    })?;
+    if loader.content() == Content::Mesh {
+        let cure = "use it as the geometry of a shape, or load it with load_mesh".into();
+        return Err(LoadError::Unsupported { path: path.into(), what: "a mesh in place of a volume".into(), cure });
+    }
+    let options = resolve(loader, options)?;
     let mut reader = loader.open(path, &options)?;
     let data = reader.read(progress)?;
     for warning in reader.warnings() {
         warning.emit();
     }
     Volume::new(reader.desc().clone(), data).map_err(|source| LoadError::Volume { path: path.into(), source })
+}
+
+/// Reads a mesh or surface with a given loader.
+///
+/// # Errors
+/// As [`Loader::read_mesh`], and if the loader reads volumes.
+pub fn load_mesh(
+    loader: &dyn Loader,
+    path: &Path,
+    options: &LoadOptions,
+    progress: &dyn Progress,
+) -> Result<MeshData, LoadError> {
+    if loader.content() == Content::Volume {
+        let cure = "use it as a volume".into();
+        return Err(LoadError::Unsupported { path: path.into(), what: "a volume in place of a mesh".into(), cure });
+    }
+    let options = resolve(loader, options)?;
+    let data = loader.read_mesh(path, &options, progress)?;
+    data.warnings.iter().for_each(Warning::emit);
+    Ok(data)
+}
+
+fn resolve(loader: &dyn Loader, options: &LoadOptions) -> Result<LoadOptions, LoadError> {
+    let declaration = loader.declaration();
+    declaration.resolve(options, |_| false).map_err(|problems| LoadError::Options {
+        loader: declaration.name.clone(),
+        problem: problems.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "),
+    })
 }

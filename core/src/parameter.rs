@@ -4,7 +4,7 @@ use std::{collections::BTreeMap, fmt};
 
 use glam::{DMat4, DVec2, DVec3, DVec4};
 
-use crate::{Buffer, LookupTable, ScalarType, Volume, VolumeTexture};
+use crate::{Attribute, LookupTable, Volume, VolumeTexture};
 
 /// The kinds of value that a parameter can take.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -58,27 +58,6 @@ impl ParameterType {
 impl fmt::Display for ParameterType {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.name())
-    }
-}
-
-/// Per-vertex numbers, shared with their owner.
-#[derive(Clone, Debug)]
-pub struct Attribute {
-    /// The name, e.g. `temperature`.
-    pub name: String,
-    /// Type of each number.
-    pub scalar: ScalarType,
-    /// Numbers a vertex.
-    pub components: usize,
-    /// The numbers, vertex by vertex, in native byte order.
-    pub data: Buffer,
-}
-
-impl PartialEq for Attribute {
-    fn eq(&self, other: &Self) -> bool {
-        let place = |a: &Self| (a.data.bytes().as_ptr(), a.data.len());
-        (&self.name, self.scalar, self.components, place(self))
-            == (&other.name, other.scalar, other.components, place(other))
     }
 }
 

@@ -2,14 +2,15 @@
 
 use std::{collections::BTreeMap, fmt, path::Path, sync::Arc};
 
+use glam::DVec3;
 use thiserror::Error;
 
 use crate::{
-    ActionError, Block, Context, Declaration, Geometry, LoadError, LoadOptions, Loader, Options, ParameterDecl,
-    ParameterType, ParameterValue, Progress, RenderAction, ShaderEntry, Volume,
+    ActionError, Block, Context, Cylinder, Data, Declaration, Geometry, LoadError, LoadOptions, Loader, MeshData,
+    Options, ParameterDecl, ParameterType, ParameterValue, Progress, RenderAction, ShaderEntry, Sphere, Volume,
     checked::{self, CheckedAction},
     geometry::GeometryError,
-    loader::{self, NoProgress},
+    loader::{self, Content, NoProgress},
     null::{self, NullAction},
     parameter::{Kind, ParameterMap},
     shader::{self, ShaderCatalog},
@@ -73,6 +74,8 @@ impl Registry {
         // `checked` is made by `action`, which can look up what it wraps.
         self.add_action(checked::declaration(), Arc::new(|context, _| Ok(Box::new(NullAction::new(context)))))?;
         self.add_geometry(block_declaration(), Arc::new(make_block))?;
+        self.add_geometry(sphere_declaration(), Arc::new(make_sphere))?;
+        self.add_geometry(cylinder_declaration(), Arc::new(make_cylinder))?;
         shader::builtin().into_iter().try_for_each(|entry| self.add_shader(entry))
     }
 
@@ -224,6 +227,39 @@ impl Registry {
         loader::load(loader.as_ref(), path, options, progress)
     }
 
+    /// Reads a mesh or surface: the loader is chosen by content before extension.
+    ///
+    /// # Errors
+    /// If the file cannot be read, is damaged, no loader knows it, or it holds a volume.
+    pub fn load_mesh(&self, path: impl AsRef<Path>) -> Result<MeshData, LoadError> {
+        let path = path.as_ref();
+        let loader = loader::choose(&self.loaders, path)?;
+        loader::load_mesh(loader.as_ref(), path, &LoadOptions::new(), &NoProgress)
+    }
+
+    /// Reads whatever a file holds, with a named loader or the one that is surest of it.
+    ///
+    /// # Errors
+    /// As [`load_with`](Self::load_with) and [`load_mesh`](Self::load_mesh).
+    pub fn load_any(
+        &self,
+        path: impl AsRef<Path>,
+        loader: Option<&str>,
+        options: &LoadOptions,
+        progress: &dyn Progress,
+    ) -> Result<Data, LoadError> {
+        let path = path.as_ref();
+        let loader = match loader {
+            Some(name) => self.loader(name)?,
+            None => loader::choose(&self.loaders, path)?,
+        };
+        log::debug!("{}: read by loader {}", path.display(), loader.declaration().name);
+        match loader.content() {
+            Content::Volume => loader::load(loader.as_ref(), path, options, progress).map(Data::Volume),
+            Content::Mesh => loader::load_mesh(loader.as_ref(), path, options, progress).map(Data::Mesh),
+        }
+    }
+
     fn loader(&self, name: &str) -> Result<&Arc<dyn Loader>, LoadError> {
         let names: Vec<_> = self.loaders.iter().map(|l| l.declaration().name.as_str()).collect();
         self.loaders.iter().find(|l| l.declaration().name == name).ok_or_else(|| LoadError::UnknownLoader {
@@ -265,10 +301,51 @@ fn block_declaration() -> Declaration {
         .with(vec3("dimensions", "its lengths"))
 }
 
-fn make_block(parameters: &ParameterMap) -> Result<Arc<dyn Geometry>, GeometryError> {
-    let vec3 = |name: &str| match parameters.get(name) {
+fn vec3(parameters: &ParameterMap, name: &str) -> DVec3 {
+    match parameters.get(name) {
         Some(ParameterValue::Vec3(v)) => *v,
-        _ => glam::DVec3::NAN,
-    };
-    Ok(Arc::new(Block::new(vec3("offset"), vec3("dimensions"))?))
+        _ => DVec3::NAN,
+    }
+}
+
+fn number(parameters: &ParameterMap, name: &str) -> f64 {
+    parameters.get(name).and_then(ParameterValue::as_float).unwrap_or(f64::NAN)
+}
+
+fn make_block(parameters: &ParameterMap) -> Result<Arc<dyn Geometry>, GeometryError> {
+    Ok(Arc::new(Block::new(vec3(parameters, "offset"), vec3(parameters, "dimensions"))?))
+}
+
+fn round_declaration(name: &str, text: &str) -> Declaration {
+    Declaration::new(Kind::Geometry, name, env!("CARGO_PKG_VERSION"), text)
+        .with(ParameterDecl::new("radius", ParameterType::Float, "its radius").unit("object units").required())
+        .with(
+            ParameterDecl::new("segments", ParameterType::Int, "flat faces around its axis")
+                .default(64i64)
+                .bounds(3.0, 1024.0),
+        )
+}
+
+fn sphere_declaration() -> Declaration {
+    let text = "a ball, as a polyhedron whose vertices lie on it";
+    round_declaration("sphere", text)
+        .with(ParameterDecl::new("center", ParameterType::Vec3, "its centre").unit("object units").required())
+}
+
+fn make_sphere(parameters: &ParameterMap) -> Result<Arc<dyn Geometry>, GeometryError> {
+    let (center, radius) = (vec3(parameters, "center"), number(parameters, "radius"));
+    Ok(Arc::new(Sphere::new(center, radius, number(parameters, "segments") as u32)?))
+}
+
+fn cylinder_declaration() -> Declaration {
+    let text = "a cylinder, as a prism whose edges lie on it";
+    let end = |name, text| ParameterDecl::new(name, ParameterType::Vec3, text).unit("object units").required();
+    round_declaration("cylinder", text)
+        .with(end("start", "one end of its axis"))
+        .with(end("end", "the other end of its axis"))
+}
+
+fn make_cylinder(parameters: &ParameterMap) -> Result<Arc<dyn Geometry>, GeometryError> {
+    let (ends, radius) = ([vec3(parameters, "start"), vec3(parameters, "end")], number(parameters, "radius"));
+    Ok(Arc::new(Cylinder::new(ends, radius, number(parameters, "segments") as u32)?))
 }

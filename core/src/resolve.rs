@@ -3,7 +3,7 @@
 use glam::DAffine3;
 
 use crate::{
-    Aabb, ActionError, Compositing, LookupTable, ParameterValue, ShaderEntry, Shape, VolumeTexture, Warning,
+    Aabb, ActionError, Attribute, Compositing, LookupTable, ParameterValue, ShaderEntry, Shape, VolumeTexture, Warning,
     WarningCode,
     geometry::GeometryError,
     parameter::{ParameterMap, ParameterProblem, ProblemKind},
@@ -52,6 +52,7 @@ impl ResolvedShape {
             ActionError::Parameters { shape: name.clone(), shader: state.shader.clone(), problems }
         })?;
         check_geometry(&name, &state)?;
+        check_attributes(&name, &state, &parameters)?;
         let to_object = state.transform.inverse();
         let finite = state.transform.is_finite() && to_object.is_finite();
         if !finite || state.transform.matrix3.determinant() == 0.0 {
@@ -90,6 +91,14 @@ impl ResolvedShape {
         }
     }
 
+    /// An attribute parameter.
+    pub fn attribute(&self, name: &str) -> Option<&Attribute> {
+        match self.parameters.get(name) {
+            Some(ParameterValue::Attribute(a)) => Some(a),
+            _ => None,
+        }
+    }
+
     /// A number.
     pub fn float(&self, name: &str) -> Option<f64> {
         self.parameters.get(name).and_then(ParameterValue::as_float)
@@ -123,6 +132,7 @@ impl ResolvedShape {
         self.state.geometry_version == other.state.geometry_version
             && self.state.shader == other.state.shader
             && self.state.transform == other.state.transform
+            && self.state.clip == other.state.clip
             && self.parameters == other.parameters
             && versions(self) == versions(other)
     }
@@ -141,6 +151,23 @@ fn check_geometry(shape: &str, state: &ShapeState) -> Result<(), ActionError> {
         wanted: "finite corners, none below the other".into(),
     };
     Err(ActionError::Geometry { shape: shape.into(), source })
+}
+
+/// Refuses attributes that do not go with the geometry's vertices.
+fn check_attributes(shape: &str, state: &ShapeState, parameters: &ParameterMap) -> Result<(), ActionError> {
+    let Some(vertices) = state.geometry.vertex_count() else { return Ok(()) };
+    for (name, value) in parameters {
+        let ParameterValue::Attribute(attribute) = value else { continue };
+        if attribute.len() != vertices {
+            let kind = ProblemKind::Mistyped {
+                found: format!("attribute {:?} of {} vertices", attribute.name, attribute.len()),
+                wanted: format!("one of {vertices}, the geometry's"),
+            };
+            let problems = vec![ParameterProblem { name: name.clone(), kind }];
+            return Err(ActionError::Parameters { shape: shape.into(), shader: state.shader.clone(), problems });
+        }
+    }
+    Ok(())
 }
 
 fn improve_hints(problems: &mut [ParameterProblem], shader: &ShaderEntry, shaders: &ShaderCatalog) {

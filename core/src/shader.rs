@@ -6,7 +6,7 @@
 use std::{collections::BTreeMap, sync::Arc};
 
 use crate::{
-    Declaration, ParameterDecl, ParameterType,
+    Declaration, ParameterDecl, ParameterType, ParameterValue,
     parameter::{Kind, ParameterProblem},
 };
 
@@ -97,7 +97,7 @@ pub(crate) fn join(problems: &[ParameterProblem]) -> String {
     problems.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ")
 }
 
-/// The shaders whose meaning this crate defines: they read one volume and a table.
+/// The shaders whose meaning this crate defines.
 pub fn builtin() -> Vec<ShaderEntry> {
     let version = env!("CARGO_PKG_VERSION");
     let volume = || ParameterDecl::new("volume", ParameterType::Volume, "the data").required();
@@ -141,6 +141,46 @@ pub fn builtin() -> Vec<ShaderEntry> {
             Compositing::Add,
             "the line integral of the value divided by the unit distance, classified",
             vec![volume(), table(grey), unit(), component()],
+        ),
+        entry(
+            "attribute",
+            Compositing::Over,
+            "per-vertex numbers of a mesh through a lookup table, emission and absorption",
+            vec![
+                ParameterDecl::new("scalars", ParameterType::Attribute, "the numbers that are classified").required(),
+                ParameterDecl::new(
+                    "opacity_scalars",
+                    ParameterType::Attribute,
+                    "the numbers whose classification gives the opacity; by default the scalars, too",
+                ),
+                table("from value to colour and opacity").required(),
+                ParameterDecl::new(
+                    "opacity_table",
+                    ParameterType::Table,
+                    "the table that gives the opacity; by default the lookup table",
+                ),
+                unit(),
+                ParameterDecl::new("component", ParameterType::Int, "the component of the scalars that is read")
+                    .default(0i64)
+                    .bounds(0.0, 255.0),
+            ],
+        ),
+        entry(
+            "surface",
+            Compositing::First,
+            "opaque triangles, lit from both sides: color × (ambient + (1 − ambient)·|normal·light|)",
+            vec![
+                ParameterDecl::new("color", ParameterType::Color, "the colour; surfaces are opaque")
+                    .default(ParameterValue::Color([0.8, 0.8, 0.8, 1.0])),
+                ParameterDecl::new(
+                    "lightdir",
+                    ParameterType::Vec3,
+                    "the direction to the light in world space; by default the light is at the eye",
+                ),
+                ParameterDecl::new("ambient", ParameterType::Float, "the part of the light that comes from everywhere")
+                    .default(0.2)
+                    .bounds(0.0, 1.0),
+            ],
         ),
     ]
 }

@@ -8,7 +8,7 @@ use std::sync::{Arc, RwLock};
 use glam::{DAffine3, DVec3};
 
 use crate::{
-    Aabb, Block, Geometry, ParameterValue, Volume, VolumeTexture, Warning, WarningCode, parameter::ParameterMap,
+    Aabb, Block, Clip, Geometry, ParameterValue, Volume, VolumeTexture, Warning, WarningCode, parameter::ParameterMap,
     volume::next_version,
 };
 
@@ -47,6 +47,8 @@ pub struct ShapeState {
     pub parameters: ParameterMap,
     /// Object space to world space.
     pub transform: DAffine3,
+    /// What cuts it, in object space.
+    pub clip: Clip,
 }
 
 impl ShapeState {
@@ -124,7 +126,7 @@ impl Shape {
         let name = name.into();
         let Appearance { shader, parameters } = appearance;
         let geometry_version = next_version();
-        let mut state = ShapeState { geometry, geometry_version, shader, parameters, transform };
+        let mut state = ShapeState { geometry, geometry_version, shader, parameters, transform, clip: Clip::NONE };
         let mut notes = Vec::new();
         if !state.parameters.contains_key("unit_distance") {
             let unit = default_unit_distance(&state);
@@ -172,6 +174,11 @@ impl Shape {
     /// Replaces the transform from object to world space.
     pub fn set_transform(&self, transform: DAffine3) {
         self.write().transform = transform;
+    }
+
+    /// Replaces what cuts the shape, in object space.
+    pub fn set_clip(&self, clip: Clip) {
+        self.write().clip = clip;
     }
 
     /// Switches the shader and keeps the parameters.

@@ -6,7 +6,7 @@ use super::{
     AttributeSpec, AttributeValues, ParameterSpec, Problem, Problems, TableEntries, TableSpec, check, document,
     parameters, reader::Reader,
 };
-use crate::{Buffer, LookupTable, ParameterDecl, ParameterValue, ScalarType, parameter::Attribute};
+use crate::{Attribute, Buffer, LookupTable, ParameterDecl, ParameterValue, ScalarType};
 
 /// The longest table or attribute file in bytes.
 const MAX_FILE: u64 = 1 << 30;
