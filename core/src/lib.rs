@@ -9,6 +9,7 @@
 pub mod action;
 pub mod attribute;
 pub mod bulk;
+pub mod bvh;
 pub mod camera;
 pub mod checked;
 pub mod config;
@@ -36,6 +37,7 @@ pub mod warning;
 pub use action::{ActionError, Caps, Context, Options, RenderAction};
 pub use attribute::Attribute;
 pub use bulk::{Buffer, Bulk};
+pub use bvh::Bvh;
 pub use camera::{Camera, Projection, Ray, RayGrid, View};
 pub use frame::{Frame, FrameDesc, Method, Statistics, Viewport};
 pub use geometry::{
