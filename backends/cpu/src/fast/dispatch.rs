@@ -1,23 +1,16 @@
 //! From the vector unit and voxel type found at run time to the kernel compiled for them.
 #![expect(unsafe_code, reason = "calls kernels of a vector unit that was found")]
 
+use volact_core::camera::LinearRays;
+
 use super::{
     fetch::{self, Access},
     over::{self, Pixels},
-    packet::{Packet, Rays},
+    packet::{Bundle, Packet, Place, Span},
     reduce::{self, Reduced},
     simd::{LANES, Plain, Simd, Unit},
     walk::Counts,
 };
-
-/// A packet's place in the picture.
-#[derive(Clone, Copy, Debug)]
-pub struct At {
-    /// Its first pixel in the viewport.
-    pub pixel: [usize; 2],
-    /// The viewport's size.
-    pub size: [usize; 2],
-}
 
 /// Runs `$call` with `F` bound to the fetcher of an access.
 macro_rules! by_access {
@@ -52,82 +45,90 @@ macro_rules! by_access {
 }
 
 #[inline(always)]
-unsafe fn over_by<S: Simd>(job: &over::Job<'_>, rays: &Rays, at: At, counts: &mut Counts) -> Option<Pixels> {
-    let packet = Packet::new(rays, at.pixel, at.size);
-    if packet.active == 0 {
-        return None;
-    }
+unsafe fn over_by<S: Simd>(job: &over::Job<'_>, packet: &Packet, pixels: &mut Pixels, counts: &mut Counts) {
     // SAFETY: the caller's promises.
-    Some(by_access!(job.voxels.access(), F => unsafe { over::draw::<S, F>(job, &packet, counts) }))
+    by_access!(job.voxels.access(), F => unsafe { over::draw::<S, F>(job, packet, pixels, counts) })
 }
 
 #[inline(always)]
-unsafe fn reduce_by<S: Simd>(
-    job: &reduce::Job<'_>,
-    rays: &Rays,
-    at: At,
-    counts: &mut Counts,
-) -> Option<[Reduced; LANES]> {
-    let packet = Packet::new(rays, at.pixel, at.size);
-    if packet.active == 0 {
-        return None;
-    }
+unsafe fn reduce_by<S: Simd>(job: &reduce::Job<'_>, packet: &Packet, out: &mut [Reduced; LANES], counts: &mut Counts) {
     // SAFETY: the caller's promises.
-    Some(by_access!(job.voxels.access(), F => unsafe { reduce::reduce::<S, F>(job, &packet, counts) }))
+    by_access!(job.voxels.access(), F => unsafe { reduce::reduce::<S, F>(job, packet, out, counts) })
 }
 
-macro_rules! for_unit {
-    ($over:ident, $reduce:ident, $unit:ty $(, $features:literal)?) => {
-        $(#[target_feature(enable = $features)])?
-        unsafe fn $over(job: &over::Job<'_>, rays: &Rays, at: At, counts: &mut Counts) -> Option<Pixels> {
-            // SAFETY: compiled for the unit; the caller has found it.
-            unsafe { over_by::<$unit>(job, rays, at, counts) }
-        }
-
-        $(#[target_feature(enable = $features)])?
-        unsafe fn $reduce(job: &reduce::Job<'_>, rays: &Rays, at: At, counts: &mut Counts) -> Option<[Reduced; LANES]> {
-            // SAFETY: as above.
-            unsafe { reduce_by::<$unit>(job, rays, at, counts) }
+/// Functions compiled for each unit, and the one that chooses.
+macro_rules! by_unit {
+    ($(#[$doc:meta])* $name:ident($($arg:ident: $t:ty),*) $(-> $r:ty)?, $($S:ident)? => $call:expr) => {
+        $(#[$doc])*
+        pub fn $name(unit: Unit, $($arg: $t),*) $(-> $r)? {
+            #[cfg(target_arch = "x86_64")]
+            #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx2,fma")]
+            unsafe fn avx512($($arg: $t),*) $(-> $r)? {
+                $(type $S = super::simd::Avx512;)?
+                // SAFETY: compiled for the unit; the caller has found it.
+                unsafe { $call }
+            }
+            #[cfg(target_arch = "x86_64")]
+            #[target_feature(enable = "avx2,fma")]
+            unsafe fn avx2($($arg: $t),*) $(-> $r)? {
+                $(type $S = super::simd::Avx2;)?
+                // SAFETY: as above.
+                unsafe { $call }
+            }
+            unsafe fn plain($($arg: $t),*) $(-> $r)? {
+                $(type $S = Plain;)?
+                // SAFETY: as above.
+                unsafe { $call }
+            }
+            debug_assert!(unit.available());
+            // SAFETY: units are only made by `Unit::detect` or after `Unit::available`.
+            unsafe {
+                match unit {
+                    #[cfg(target_arch = "x86_64")]
+                    Unit::Avx512 => avx512($($arg),*),
+                    #[cfg(target_arch = "x86_64")]
+                    Unit::Avx2 => avx2($($arg),*),
+                    _ => plain($($arg),*),
+                }
+            }
         }
     };
 }
 
-#[cfg(target_arch = "x86_64")]
-for_unit!(over_avx512, reduce_avx512, super::simd::Avx512, "avx512f,avx512bw,avx512dq,avx512vl,avx2,fma");
-#[cfg(target_arch = "x86_64")]
-for_unit!(over_avx2, reduce_avx2, super::simd::Avx2, "avx2,fma");
-for_unit!(over_plain, reduce_plain, Plain);
-
-/// Draws a packet of an `over` shape; `None` where no ray meets it.
-///
-/// # Panics
-/// If the machine has not the unit.
-pub fn draw(unit: Unit, job: &over::Job<'_>, rays: &Rays, at: At, counts: &mut Counts) -> Option<Pixels> {
-    debug_assert!(unit.available());
-    // SAFETY: units are only made by `Unit::detect` or after `Unit::available`.
-    unsafe {
-        match unit {
-            #[cfg(target_arch = "x86_64")]
-            Unit::Avx512 => over_avx512(job, rays, at, counts),
-            #[cfg(target_arch = "x86_64")]
-            Unit::Avx2 => over_avx2(job, rays, at, counts),
-            _ => over_plain(job, rays, at, counts),
-        }
-    }
+/// # Safety
+/// None of its own: it is unsafe so that it is called like the kernels.
+#[inline(always)]
+unsafe fn bundle_by(rays: &LinearRays, pixel: [usize; 2], size: [usize; 2]) -> Bundle {
+    Bundle::new(rays, pixel, size)
 }
 
-/// Reduces a packet of a shape composited by maximum, minimum, average or add; `None` where no ray
-/// meets it.
-pub fn reduce(unit: Unit, job: &reduce::Job<'_>, rays: &Rays, at: At, counts: &mut Counts) -> Option<[Reduced; LANES]> {
-    debug_assert!(unit.available());
-    // SAFETY: as in `draw`.
-    unsafe {
-        match unit {
-            #[cfg(target_arch = "x86_64")]
-            Unit::Avx512 => reduce_avx512(job, rays, at, counts),
-            #[cfg(target_arch = "x86_64")]
-            Unit::Avx2 => reduce_avx2(job, rays, at, counts),
-            _ => reduce_plain(job, rays, at, counts),
-        }
-    }
+/// # Safety
+/// As above.
+#[inline(always)]
+unsafe fn aim_by(bundle: &Bundle, span: &Span, place: &Place) -> Packet {
+    Packet::new(bundle, span, place)
+}
+
+by_unit! {
+    /// The rays of sixteen pixels of a viewport of `size`.
+    bundle(rays: &LinearRays, pixel: [usize; 2], size: [usize; 2]) -> Bundle,
+    => bundle_by(rays, pixel, size)
+}
+
+by_unit! {
+    /// The rays of a bundle inside a shape's box, where `span` holds them.
+    aim(bundle: &Bundle, span: &Span, place: &Place) -> Packet,
+    => aim_by(bundle, span, place)
+}
+
+by_unit! {
+    /// Draws a packet of an `over` shape behind what is there.
+    draw(job: &over::Job<'_>, packet: &Packet, pixels: &mut Pixels, counts: &mut Counts),
+    S => over_by::<S>(job, packet, pixels, counts)
+}
+
+by_unit! {
+    /// Reduces a packet of a shape composited by maximum, minimum, average or add.
+    reduce(job: &reduce::Job<'_>, packet: &Packet, out: &mut [Reduced; LANES], counts: &mut Counts),
+    S => reduce_by::<S>(job, packet, out, counts)
 }

@@ -13,13 +13,19 @@
 
 pub mod action;
 pub mod bounds;
+pub mod check;
 pub mod classify;
 pub mod dispatch;
 pub mod fetch;
 pub mod general;
+pub mod method;
+pub mod mesh;
 pub mod options;
+pub mod order;
 pub mod over;
 pub mod packet;
+pub mod picture;
+pub mod plan;
 pub mod preintegrate;
 pub mod reduce;
 pub mod resources;

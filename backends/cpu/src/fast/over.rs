@@ -36,53 +36,58 @@ pub struct Job<'a> {
     pub threshold: f32,
 }
 
-/// What came of a packet.
+/// What sixteen rays have seen so far.
 #[derive(Clone, Debug)]
 pub struct Pixels {
     /// Premultiplied RGBA.
     pub color: [[f32; 4]; LANES],
     /// `t` at which the threshold is reached.
     pub depth: [f64; LANES],
-    /// `t` at which the ray enters the shape; infinite where it misses.
-    pub start: [f64; LANES],
 }
 
 impl Default for Pixels {
     fn default() -> Self {
-        Self { color: [[0.0; 4]; LANES], depth: [f64::INFINITY; LANES], start: [f64::INFINITY; LANES] }
+        Self { color: [[0.0; 4]; LANES], depth: [f64::INFINITY; LANES] }
     }
 }
 
-/// Draws a packet.
+impl Pixels {
+    /// Lanes with less than `termination` left to see.
+    #[inline(always)]
+    pub fn done(&self, termination: f32) -> u32 {
+        let mut done = 0;
+        for (l, color) in self.color.iter().enumerate() {
+            done |= u32::from(1.0 - color[3] < termination) << l;
+        }
+        done
+    }
+}
+
+/// Draws a packet behind what its rays have seen.
 ///
 /// # Safety
 /// Called from a function compiled for `S` on a machine that has it; `F` is the voxels' access.
 #[inline(always)]
-pub unsafe fn draw<S: Simd, F: Fetch>(job: &Job<'_>, packet: &Packet, counts: &mut Counts) -> Pixels {
-    let mut pixels = Pixels::default();
-    for l in 0..LANES {
-        pixels.start[l] = if packet.active >> l & 1 == 1 { packet.start[l] } else { f64::INFINITY };
-    }
+pub unsafe fn draw<S: Simd, F: Fetch>(job: &Job<'_>, packet: &Packet, pixels: &mut Pixels, counts: &mut Counts) {
     let cuts = packet.split(job.lattice.step);
-    counts.rays += u64::from(packet.active.count_ones());
+    let done = pixels.done(job.termination);
     counts.lattice += cuts.count();
     let blocks = job.empty.map(|e| e.blocks);
     // SAFETY: the caller's promises.
     unsafe {
-        ends::<S, F>(job, packet, &cuts.front, 0, &mut pixels, counts);
-        let step = job.lattice.step;
+        ends::<S, F>(job, packet, &cuts.front, done, pixels, counts);
+        let (step, at) = (job.lattice.step, (&job.voxels, packet, &cuts));
         let done = if let Some(pairs) = job.pairs {
-            let mut kernel = PairKernel::<S>::new(job, pairs, &mut pixels);
-            walk::<S, F, _>(&mut kernel, &job.voxels, packet, &cuts, step, blocks, counts);
+            let mut kernel = PairKernel::<S>::new(job, pairs, pixels, done);
+            walk::<S, F, _>(&mut kernel, at, step, blocks, done, counts);
             kernel.shared.finish()
         } else {
-            let mut kernel = SampleKernel::<S>::new(job, &mut pixels);
-            walk::<S, F, _>(&mut kernel, &job.voxels, packet, &cuts, step, blocks, counts);
+            let mut kernel = SampleKernel::<S>::new(job, pixels, done);
+            walk::<S, F, _>(&mut kernel, at, step, blocks, done, counts);
             kernel.shared.finish()
         };
-        ends::<S, F>(job, packet, &cuts.back, done, &mut pixels, counts);
+        ends::<S, F>(job, packet, &cuts.back, done, pixels, counts);
     }
-    pixels
 }
 
 /// Adds the cut segments of all lanes that are not done.
@@ -239,12 +244,12 @@ struct Shared<'a, S: Simd> {
 
 impl<'a, S: Simd> Shared<'a, S> {
     #[inline(always)]
-    unsafe fn new(job: &'a Job<'a>, pixels: &'a mut Pixels) -> Self {
+    unsafe fn new(job: &'a Job<'a>, pixels: &'a mut Pixels, done: u32) -> Self {
         let before = pixels.color.map(|c| c[3]);
         let reached = (0..LANES).fold(0, |bits, l| bits | u32::from(before[l] >= job.threshold) << l);
         // SAFETY: the caller's promises.
         let color = unsafe { S::load_quads(&pixels.color) };
-        Self { job, pixels, color, before, done: 0, reached }
+        Self { job, pixels, color, before, done, reached }
     }
 
     /// Ends a chunk; `depth(lane, opacity before)` finds where the threshold was reached.
@@ -307,9 +312,9 @@ struct SampleKernel<'a, S: Simd> {
 
 impl<'a, S: Simd> SampleKernel<'a, S> {
     #[inline(always)]
-    unsafe fn new(job: &'a Job<'a>, pixels: &'a mut Pixels) -> Self {
+    unsafe fn new(job: &'a Job<'a>, pixels: &'a mut Pixels, done: u32) -> Self {
         // SAFETY: the caller's promises.
-        let shared = unsafe { Shared::new(job, pixels) };
+        let shared = unsafe { Shared::new(job, pixels, done) };
         Self { shared, rows: 0, row_of: [0; CHUNK], index: [[0; LANES]; CHUNK], fraction: [[0.0; LANES]; CHUNK] }
     }
 }
@@ -408,12 +413,12 @@ struct PairKernel<'a, S: Simd> {
 
 impl<'a, S: Simd> PairKernel<'a, S> {
     #[inline(always)]
-    unsafe fn new(job: &'a Job<'a>, pairs: &'a SegmentPairs, pixels: &'a mut Pixels) -> Self {
+    unsafe fn new(job: &'a Job<'a>, pairs: &'a SegmentPairs, pixels: &'a mut Pixels, done: u32) -> Self {
         let zero = [[0.0; LANES]; CHUNK];
         // SAFETY: the caller's promises.
         unsafe {
             Self {
-                shared: Shared::new(job, pixels),
+                shared: Shared::new(job, pixels, done),
                 pairs,
                 rows: 0,
                 row_of: [0; CHUNK],

@@ -1,7 +1,10 @@
-//! Packets: sixteen neighbouring rays, four by four pixels, with their intervals in one shape.
+//! Packets: sixteen neighbouring rays, four by four pixels, and their intervals.
+//!
+//! A [`Bundle`] is the rays in world space, made once for all shapes; a [`Packet`] is the same
+//! rays in a shape's sample space, with one interval each.
 
 use volact_core::{
-    Aabb, RayGrid,
+    Aabb,
     camera::LinearRays,
     glam::{DAffine3, DVec3},
     resolve::ResolvedShape,
@@ -11,6 +14,12 @@ use super::simd::LANES;
 
 /// Pixels of a packet along each side.
 pub const SIDE: usize = 4;
+
+/// Sixteen f64.
+pub type Lanes = [f64; LANES];
+
+/// Sixteen vectors, by axis and lane.
+pub type Vectors = [Lanes; 3];
 
 /// Where a shape lies.
 #[derive(Clone, Copy, Debug)]
@@ -33,38 +42,53 @@ impl Place {
     }
 }
 
-/// Sixteen f64.
-pub type Lanes = [f64; LANES];
-
-/// The rays of a picture in a shape's object space, ready to be made in packets.
+/// One interval of each of sixteen rays.
 #[derive(Clone, Copy, Debug)]
-pub struct Rays {
-    world: LinearRays,
-    place: Place,
+pub struct Span {
+    /// Beginnings in `t`.
+    pub start: Lanes,
+    /// Ends in `t`.
+    pub end: Lanes,
+    /// Lanes that have one.
+    pub active: u32,
 }
 
-impl Rays {
-    /// The rays of a grid through a shape.
-    pub fn new(grid: &RayGrid, place: Place) -> Self {
-        Self { world: grid.linear(), place }
+impl Span {
+    /// No interval.
+    pub const NONE: Self = Self { start: [0.0; LANES], end: [0.0; LANES], active: 0 };
+
+    /// Ends intervals at the latest at `limit`.
+    #[inline(always)]
+    pub fn limit(&mut self, limit: &Lanes) {
+        for (end, &limit) in self.end.iter_mut().zip(limit) {
+            *end = if limit < *end { limit } else { *end };
+        }
+        self.settle();
+    }
+
+    /// Lets go of lanes whose interval has no length or no end.
+    #[inline(always)]
+    pub fn settle(&mut self) {
+        for l in 0..LANES {
+            let some = self.start[l] < self.end[l] && (self.end[l] - self.start[l]).is_finite();
+            self.active &= !(u32::from(!some) << l);
+        }
     }
 }
 
-/// Sixteen rays in a shape's sample space.
+/// Sixteen rays in world space.
 #[derive(Clone, Debug)]
-pub struct Packet {
-    /// Sample coordinates at `t = 0`, by axis and lane.
-    pub origin: [Lanes; 3],
-    /// Sample coordinates a world unit, by axis and lane.
-    pub direction: [Lanes; 3],
-    /// Beginnings of the intervals in `t`.
-    pub start: Lanes,
-    /// Ends of the intervals in `t`.
-    pub end: Lanes,
+pub struct Bundle {
+    /// The first pixel, in the viewport.
+    pub pixel: [usize; 2],
+    /// Points at `t = 0`.
+    pub origin: Vectors,
+    /// Unit directions.
+    pub direction: Vectors,
+    /// What the camera sees of them, of the lanes inside the viewport.
+    pub span: Span,
     /// Distance that depth adds to `t`.
     pub depth_zero: f64,
-    /// Lanes with an interval of some length.
-    pub active: u32,
 }
 
 #[inline(always)]
@@ -76,12 +100,13 @@ fn each(f: impl Fn(usize) -> f64) -> Lanes {
     out
 }
 
-impl Packet {
+impl Bundle {
     /// The rays of pixels `x..x + 4`, `y..y + 4` inside a viewport of `size`: what
     /// [`RayGrid::ray`] gives, sixteen at once.
+    ///
+    /// [`RayGrid::ray`]: volact_core::RayGrid::ray
     #[inline(always)]
-    pub fn new(rays: &Rays, [x, y]: [usize; 2], size: [usize; 2]) -> Self {
-        let w = &rays.world;
+    pub fn new(w: &LinearRays, [x, y]: [usize; 2], size: [usize; 2]) -> Self {
         let px = each(|l| (x + l % SIDE) as f64 + 0.5);
         let py = each(|l| (y + l / SIDE) as f64 + 0.5);
         let plane = |a: usize| each(|l| w.corner[a] + w.dx[a] * px[l] + w.dy[a] * py[l]);
@@ -101,53 +126,98 @@ impl Packet {
                 ([point(0), point(1), point(2)], [[d.x; LANES], [d.y; LANES], [d.z; LANES]])
             }
         };
-        let mut packet = Self::through(rays, origin, direction);
-        for l in 0..LANES {
-            if x + l % SIDE >= size[0] || y + l / SIDE >= size[1] {
-                packet.active &= !(1 << l);
-            }
-        }
-        packet
-    }
-
-    #[inline(always)]
-    fn through(rays: &Rays, origin: [Lanes; 3], direction: [Lanes; 3]) -> Self {
-        let (w, place) = (&rays.world, &rays.place);
         let slope = each(|l| w.axis.x * direction[0][l] + w.axis.y * direction[1][l] + w.axis.z * direction[2][l]);
         let base = each(|l| w.axis.x * origin[0][l] + w.axis.y * origin[1][l] + w.axis.z * origin[2][l]);
-        let plane = |at: f64| each(|l| if at.is_finite() { (at - base[l]) / slope[l] } else { at });
-        let (mut start, mut end) = (plane(w.near), plane(w.far));
+        let at = |plane: f64| each(|l| if plane.is_finite() { (plane - base[l]) / slope[l] } else { plane });
+        let (mut start, end) = (at(w.near), at(w.far));
         if w.eye.is_some() {
             start = each(|l| if start[l] > 0.0 { start[l] } else { 0.0 });
         }
-        let point = transform(&place.to_object, &origin, place.to_object.translation);
-        let vector = transform(&place.to_object, &direction, DVec3::ZERO);
-        let mut misses = [false; LANES];
-        for a in 0..3 {
-            let (lo, hi) = (place.block.min[a], place.block.max[a]);
-            for l in 0..LANES {
-                let (o, d) = (point[a][l], vector[a][l]);
-                let (u, v) = ((lo - o) / d, (hi - o) / d);
-                let (near, far) = if u < v { (u, v) } else { (v, u) };
-                let across = d != 0.0;
-                start[l] = if across && near > start[l] { near } else { start[l] };
-                end[l] = if across && far < end[l] { far } else { end[l] };
-                misses[l] |= !across && (o < lo || o > hi);
-            }
-        }
         let mut active = 0;
         for l in 0..LANES {
-            let inside = start[l] < end[l] && !misses[l] && (end[l] - start[l]).is_finite();
-            active |= u32::from(inside) << l;
+            active |= u32::from(x + l % SIDE < size[0] && y + l / SIDE < size[1]) << l;
         }
+        let span = Span { start, end, active };
+        Self { pixel: [x, y], origin, direction, span, depth_zero: w.depth_zero }
+    }
+
+    /// The rays' points at `t = 0` and directions, seen through a map.
+    #[inline(always)]
+    pub fn through(&self, map: &DAffine3) -> [Vectors; 2] {
+        [transform(map, &self.origin, map.translation), transform(map, &self.direction, DVec3::ZERO)]
+    }
+
+    /// A lane's ray.
+    pub fn ray(&self, l: usize) -> [DVec3; 2] {
+        [&self.origin, &self.direction].map(|v| DVec3::new(v[0][l], v[1][l], v[2][l]))
+    }
+}
+
+/// What is left of intervals inside a box, which may have no length.
+#[inline(always)]
+pub fn clip_box(block: &Aabb, [point, vector]: &[Vectors; 2], span: &Span) -> Span {
+    let Span { mut start, mut end, active } = *span;
+    let mut misses = [false; LANES];
+    for a in 0..3 {
+        let (lo, hi) = (block.min[a], block.max[a]);
+        for l in 0..LANES {
+            let (o, d) = (point[a][l], vector[a][l]);
+            let (u, v) = ((lo - o) / d, (hi - o) / d);
+            let (near, far) = if u < v { (u, v) } else { (v, u) };
+            let across = d != 0.0;
+            start[l] = if across && near > start[l] { near } else { start[l] };
+            end[l] = if across && far < end[l] { far } else { end[l] };
+            misses[l] |= !across && (o < lo || o > hi);
+        }
+    }
+    let mut missed = 0;
+    for (l, miss) in misses.into_iter().enumerate() {
+        missed |= u32::from(miss) << l;
+    }
+    let mut left = Span { start, end, active: active & !missed };
+    left.settle();
+    left
+}
+
+/// Sixteen rays in a shape's sample space.
+#[derive(Clone, Debug)]
+pub struct Packet {
+    /// Sample coordinates at `t = 0`, by axis and lane.
+    pub origin: Vectors,
+    /// Sample coordinates a world unit, by axis and lane.
+    pub direction: Vectors,
+    /// Beginnings of the intervals in `t`.
+    pub start: Lanes,
+    /// Ends of the intervals in `t`.
+    pub end: Lanes,
+    /// Lanes with an interval of some length.
+    pub active: u32,
+}
+
+impl Packet {
+    /// The rays of a bundle inside a shape's box, where `span` holds them.
+    #[inline(always)]
+    pub fn new(bundle: &Bundle, span: &Span, place: &Place) -> Self {
+        let seen = bundle.through(&place.to_object);
+        let Span { start, end, active } = clip_box(&place.block, &seen, span);
+        let [point, vector] = &seen;
         Self {
-            origin: transform(&place.to_index, &point, place.to_index.translation),
-            direction: transform(&place.to_index, &vector, DVec3::ZERO),
+            origin: transform(&place.to_index, point, place.to_index.translation),
+            direction: transform(&place.to_index, vector, DVec3::ZERO),
             start,
             end,
-            depth_zero: w.depth_zero,
             active,
         }
+    }
+
+    /// The same rays with other intervals.
+    pub fn within(&self, span: &Span) -> Self {
+        Self { start: span.start, end: span.end, active: span.active, ..*self }
+    }
+
+    /// Their intervals.
+    pub fn span(&self) -> Span {
+        Span { start: self.start, end: self.end, active: self.active }
     }
 
     /// Sample coordinates of a lane at `t`.
@@ -187,7 +257,7 @@ impl Packet {
 }
 
 #[inline(always)]
-fn transform(by: &DAffine3, v: &[Lanes; 3], offset: DVec3) -> [Lanes; 3] {
+fn transform(by: &DAffine3, v: &Vectors, offset: DVec3) -> Vectors {
     let m = &by.matrix3;
     let row = |a: usize| each(|l| m.x_axis[a] * v[0][l] + m.y_axis[a] * v[1][l] + m.z_axis[a] * v[2][l] + offset[a]);
     [row(0), row(1), row(2)]
@@ -247,7 +317,8 @@ mod tests {
         {
             let grid = camera.rays(&viewport).unwrap();
             for (x, y) in [(0, 0), (4, 0), (8, 4)] {
-                let packet = Packet::new(&Rays::new(&grid, place), [x, y], [9, 7]);
+                let bundle = Bundle::new(&grid.linear(), [x, y], [9, 7]);
+                let packet = Packet::new(&bundle, &bundle.span, &place);
                 let cuts = packet.split(0.3);
                 for l in 0..LANES {
                     let (px, py) = (x + l % SIDE, y + l / SIDE);

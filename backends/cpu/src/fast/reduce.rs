@@ -38,17 +38,20 @@ pub struct Reduced {
     pub length: f64,
 }
 
-/// Reduces a packet.
+/// Reduces a packet, on top of what came of its rays before.
 ///
 /// # Safety
 /// Called from a function compiled for `S` on a machine that has it; `F` is the voxels' access.
 #[inline(always)]
-pub unsafe fn reduce<S: Simd, F: Fetch>(job: &Job<'_>, packet: &Packet, counts: &mut Counts) -> [Reduced; LANES] {
+pub unsafe fn reduce<S: Simd, F: Fetch>(
+    job: &Job<'_>,
+    packet: &Packet,
+    out: &mut [Reduced; LANES],
+    counts: &mut Counts,
+) {
     let step = job.lattice.step;
     let cuts = packet.split(step);
-    counts.rays += u64::from(packet.active.count_ones());
     counts.lattice += cuts.count();
-    let mut out = [Reduced::default(); LANES];
     // The cut segments first: a maximum does not mind, a sum neither.
     for cut in [&cuts.front, &cuts.back] {
         // SAFETY: the caller's promises.
@@ -66,15 +69,15 @@ pub unsafe fn reduce<S: Simd, F: Fetch>(job: &Job<'_>, packet: &Packet, counts: 
     unsafe {
         match job.compositing {
             Compositing::Maximum | Compositing::Minimum => {
-                let mut kernel = Extreme::<S>::new(job, &out);
+                let mut kernel = Extreme::<S>::new(job, out);
                 let blocks = job.peaks.map(|p| p.blocks);
-                walk::<S, F, _>(&mut kernel, &job.voxels, packet, &cuts, step, blocks, counts);
-                kernel.finish(&mut out);
+                walk::<S, F, _>(&mut kernel, (&job.voxels, packet, &cuts), step, blocks, 0, counts);
+                kernel.finish(out);
             }
             _ => {
                 let mut kernel = Sum::<S>::new(job);
                 let blocks = job.empty.map(|e| e.blocks);
-                walk::<S, F, _>(&mut kernel, &job.voxels, packet, &cuts, step, blocks, counts);
+                walk::<S, F, _>(&mut kernel, (&job.voxels, packet, &cuts), step, blocks, 0, counts);
                 for l in 0..LANES {
                     let whole = cuts.to[l] - cuts.from[l] - f64::from(kernel.missing[l]);
                     out[l].value += kernel.total[l] * step;
@@ -83,7 +86,6 @@ pub unsafe fn reduce<S: Simd, F: Fetch>(job: &Job<'_>, packet: &Packet, counts: 
             }
         }
     }
-    out
 }
 
 fn merge(into: &mut Reduced, compositing: Compositing, number: f32, length: f64) {

@@ -15,6 +15,7 @@ use super::{
     classify::{SegmentTable, Units},
     fetch::Voxels,
     options::{Classification, Settings},
+    plan::Plan,
     preintegrate::SegmentPairs,
     sharp,
 };
@@ -122,13 +123,11 @@ fn density(shape: &ResolvedShape, texture: &VolumeTexture) -> DVec3 {
 }
 
 impl Resources {
-    /// Prepares the shapes for a sample distance; says what was made anew. `general` where `over`
-    /// shapes are drawn the plain way, which uses no pre-integration.
+    /// Prepares the shapes for a plan; says what was made anew.
     pub fn prepare<'a>(
         &mut self,
         shapes: impl Iterator<Item = &'a ResolvedShape>,
-        step: f64,
-        general: bool,
+        plan: &Plan,
         settings: &Settings,
         rebuilt: &mut Vec<Rebuild>,
     ) {
@@ -137,7 +136,8 @@ impl Resources {
         for shape in shapes {
             let Some(texture) = shape.volume("volume") else { continue };
             let over = shape.compositing() == Compositing::Over;
-            self.prepare_shape(shape, texture, step, if general && over { &post } else { settings }, rebuilt);
+            let settings = if plan.general && over { &post } else { settings };
+            self.prepare_shape(shape, texture, plan.step, settings, rebuilt);
         }
     }
 

@@ -85,24 +85,24 @@ pub unsafe fn around<S: Simd>(block: [S::F; 3], distance: S::F) -> (u32, [S::F; 
 /// Blocks along each axis, for a walk that skips.
 pub type Blocks = Option<[usize; 3]>;
 
-/// Visits all whole segments of a packet.
+/// Visits all whole segments of a packet, but for lanes that are done.
 ///
 /// # Safety
 /// Called from a function compiled for `S` on a machine that has it; `F` is the voxels' access.
 #[inline(always)]
 pub unsafe fn walk<S: Simd, F: Fetch, K: Kernel<S>>(
     kernel: &mut K,
-    voxels: &Voxels<'_>,
-    packet: &Packet,
-    cuts: &Cuts,
+    (voxels, packet, cuts): (&Voxels<'_>, &Packet, &Cuts),
     step: f64,
     blocks: Blocks,
+    done: u32,
     counts: &mut Counts,
 ) {
     let Some([first, last]) = cuts.whole() else { return };
     // SAFETY: the caller's promises.
     unsafe {
         let mut rows = Rows::<S>::new(voxels, packet, cuts, step, first);
+        rows.done = done;
         let mut k = first;
         while k < last {
             let chunk = k.div_euclid(CHUNK as i64) * CHUNK as i64;
