@@ -18,7 +18,6 @@ pub mod classify;
 pub mod dispatch;
 pub mod fetch;
 pub mod general;
-pub mod mesh;
 pub mod method;
 pub mod mesh;
 pub mod options;
