@@ -44,28 +44,27 @@ pub(super) struct Grid {
 }
 
 impl Grid {
-    /// The grid of a medium. With `skip` the bricks that cannot be seen are found, which reads
-    /// every sample once.
-    pub fn new(medium: &Medium, skip: bool) -> Self {
-        let (roi, nearest) = (medium.texture.data_roi(), medium.is_nearest());
+    /// The grid of a medium's voxels. With `skip` the bricks that cannot be seen are found, which
+    /// reads every sample once.
+    pub fn new(medium: &Medium, voxels: &Voxels<'_>, skip: bool) -> Self {
+        let (roi, nearest) = (voxels.roi, voxels.nearest);
         let dims = roi.dims();
         let cells = dims.map(|n| if nearest { n } else { n.saturating_sub(1).max(1) });
         let extent = dims.map(|n| usize::from(n > 1));
         let bricks = cells.map(|n| n.div_ceil(BRICK));
         let mut grid = Self { lo: roi.min, cells, extent, nearest, bricks, empty: Vec::new() };
         if skip && medium.has_opacity() {
-            grid.empty = grid.find_empty(medium);
+            grid.empty = grid.find_empty(medium, voxels);
         }
         grid
     }
 
-    fn find_empty(&self, medium: &Medium) -> Vec<bool> {
-        let voxels = Voxels::new(&medium.texture);
+    fn find_empty(&self, medium: &Medium, voxels: &Voxels<'_>) -> Vec<bool> {
         let [bx, by, bz] = self.bricks;
         let mut empty = Vec::with_capacity(bx * by * bz);
         for brick in 0..bx * by * bz {
             let at = [brick % bx, brick / bx % by, brick / (bx * by)];
-            empty.push(self.is_empty(medium, &voxels, at));
+            empty.push(self.is_empty(medium, voxels, at));
         }
         empty
     }

@@ -13,12 +13,11 @@ use volact_core::{
 };
 
 use super::{
-    cells::Cell,
     cubic,
     flat::Gather,
     line::Line,
     medium::{Medium, Voxels},
-    piece::{Cutter, Piece},
+    piece::{Cutter, Linear, Piece, Stretch},
 };
 
 /// How segments are counted on a ray.
@@ -56,11 +55,11 @@ impl Counting {
 
 /// The fields' values at a point; `None` where a NaN sample has weight.
 pub(super) fn sample(medium: &Medium, voxels: &Voxels<'_>, point: DVec3) -> Option<[f64; 4]> {
-    let roi = medium.texture.data_roi();
+    let roi = voxels.roi;
     let (mut base, mut upper, mut from) = (roi.min, [0usize; 3], [0.0; 3]);
     for a in 0..3 {
         let x = point[a].clamp(roi.min[a] as f64, roi.max[a] as f64);
-        if medium.is_nearest() {
+        if voxels.nearest {
             base[a] = ((x + 0.5).floor() as usize).min(roi.max[a]);
         } else {
             base[a] = x.floor() as usize;
@@ -116,7 +115,6 @@ pub(super) fn pre_integrated(
     cutter: &mut Cutter,
     mut visit: impl FnMut(&Piece) -> bool,
 ) {
-    let exact = Line { dt: 0.0, dp: [0.0; 3], ..*line };
     let mut last: Option<(f64, Option<[f64; 4]>)> = None;
     for s in counting.segments(line) {
         let start = match last {
@@ -126,9 +124,12 @@ pub(super) fn pre_integrated(
         let end = sample(medium, voxels, line.point(s.end));
         last = Some((s.end, end));
         let (Some(start), Some(end)) = (start, end) else { continue };
-        let (t, ends) = ([s.start, s.end], [false; 2]);
-        let cell = Cell { base: [0; 3], upper: [0; 3], t, from: [0.0; 3], step: [0.0; 3], ends };
-        if s.length() > 0.0 && !cutter.cut_linear(medium, &exact, &cell, [start, end], &mut visit) {
+        let stretch = Stretch { t: [s.start, s.end], dt: 0.0, loose: [false; 2], apart: false };
+        let linear = [0, 1, 2, 3].map(|i| {
+            let (a, b) = (start[i], end[i]);
+            Linear { values: [a, b], range: [a.min(b), a.max(b)], error: 0.0 }
+        });
+        if s.length() > 0.0 && !cutter.cut_linear(medium, &stretch, &linear, &mut visit) {
             return;
         }
     }

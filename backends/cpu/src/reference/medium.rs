@@ -1,13 +1,15 @@
-//! What a shape is made of: scalar fields on its grid, and how they become colour and opacity.
+//! What a shape is made of: scalar fields, and how they become colour and opacity.
 //!
-//! Every shader that is a table comes down to the same thing: one to four trilinear fields, each
-//! of which drives some of the channels red, green, blue and opacity through a piecewise linear
+//! Every shader that is a table comes down to the same thing: one to four scalar fields, each of
+//! which drives some of the channels red, green, blue and opacity through a piecewise linear
 //! function. A post-interpolated table is one field that drives all four; a pre-interpolated one
-//! is four fields, classified at the voxels, that drive one each; `simple` maps components.
+//! is four fields, classified at the voxels, that drive one each; `simple` maps components;
+//! `attribute` has one field for colour and one for opacity, or one for both. Fields of volumes
+//! are trilinear in a cell, fields of attributes linear in a tetrahedron.
 
 use volact_core::{
-    ControlPoint, Filter, ScalarType, TableInterpolation, VolumeTexture, resolve::ResolvedShape, table::ResolvedTable,
-    volume::Components,
+    Attribute, ControlPoint, Filter, LookupTable, Roi, ScalarType, TableInterpolation, VolumeTexture,
+    resolve::ResolvedShape, table::ResolvedTable, volume::Components,
 };
 
 use super::knots::Knots;
@@ -19,6 +21,10 @@ pub(super) enum Source {
     Component(usize),
     /// A channel of the voxels' classification.
     Classified(usize),
+    /// A component of the attribute whose numbers are classified.
+    Scalars(usize),
+    /// The first component of the attribute that gives the opacity.
+    OpacityScalars,
 }
 
 /// A scalar field and the channels that it drives.
@@ -30,10 +36,9 @@ pub(super) struct Field {
     pub drives: [bool; 4],
 }
 
-/// A shape's texture and classification.
+/// A shape's fields and their classification.
 #[derive(Clone, Debug)]
 pub(super) struct Medium {
-    pub texture: VolumeTexture,
     /// One to four.
     pub fields: Vec<Field>,
     /// World length over which opacity is the fraction absorbed.
@@ -49,19 +54,22 @@ pub(super) type Corners = [[f64; 8]; 4];
 impl Medium {
     /// Prepares a shape; `None` where its shader is not known here.
     pub fn new(shape: &ResolvedShape) -> Option<Self> {
-        let texture = shape.volume("volume")?.clone();
         let unit = shape.float("unit_distance").unwrap_or(1.0);
         let component = usize::try_from(shape.int("component").unwrap_or(0)).unwrap_or(0);
-        let range = texture.range();
-        let mut made = Self { texture, fields: Vec::new(), unit, table: None, component };
+        let mut made = Self { fields: Vec::new(), unit, table: None, component };
         match shape.state.shader.as_str() {
-            "simple" => made.fields = simple(made.texture.meaning(), range),
-            "lut" | "mip" | "minip" | "average" | "xray" => {
-                let grey = volact_core::LookupTable::grey(range);
-                let table = shape.table("lookup_table").unwrap_or(&grey);
-                let flat = shape.state.shader != "lut";
-                made.set_table(table.resolve(sorted(range)), !flat && table.interpolation() == TableInterpolation::Pre);
+            "simple" => {
+                let texture = shape.volume("volume")?;
+                made.fields = simple(texture.meaning(), texture.range());
             }
+            shader @ ("lut" | "mip" | "minip" | "average" | "xray") => {
+                let range = shape.volume("volume")?.range();
+                let grey = LookupTable::grey(range);
+                let table = shape.table("lookup_table").unwrap_or(&grey);
+                let pre = shader == "lut" && table.interpolation() == TableInterpolation::Pre;
+                made.set_table(table.resolve(sorted(range)), pre);
+            }
+            "attribute" => made.fields = attribute_fields(shape, component)?,
             _ => return None,
         }
         Some(made)
@@ -73,10 +81,8 @@ impl Medium {
             self.fields = (0..4).map(channel).collect();
             self.table = Some(table);
         } else {
-            let mut points = table.points().to_vec();
-            points.sort_by(|a, b| a.value.total_cmp(&b.value));
             let source = Source::Component(self.component);
-            self.fields = vec![Field { source, knots: Knots::new(points), drives: [true; 4] }];
+            self.fields = vec![Field { source, knots: knots(&table), drives: [true; 4] }];
         }
     }
 
@@ -95,12 +101,11 @@ impl Medium {
 
     /// Whether opacity may be 1 anywhere.
     pub fn can_be_opaque(&self) -> bool {
-        self.table.as_ref().is_none_or(|t| t.points().iter().any(|p| p.opacity >= 1.0))
-    }
-
-    /// Whether values are those of the nearest sample.
-    pub fn is_nearest(&self) -> bool {
-        self.texture.filter() == Filter::Nearest
+        if let Some(table) = &self.table {
+            return table.points().iter().any(|p| p.opacity >= 1.0);
+        }
+        let opacity = self.fields.iter().find(|f| f.drives[3]);
+        opacity.is_none_or(|f| f.knots.bounds(f64::NEG_INFINITY, f64::INFINITY)[3][1] >= 1.0)
     }
 
     /// Reads the fields at one sample; `None` where one is NaN.
@@ -168,6 +173,10 @@ pub(super) struct Voxels<'a> {
     components: usize,
     slope: f64,
     intercept: f64,
+    /// The part of the data in use.
+    pub roi: Roi,
+    /// Whether values are those of the nearest sample.
+    pub nearest: bool,
 }
 
 impl<'a> Voxels<'a> {
@@ -176,8 +185,17 @@ impl<'a> Voxels<'a> {
         let desc = texture.volume().desc();
         let [nx, ny, _] = desc.dims;
         let bytes = texture.volume().data().bytes();
-        let (slope, intercept) = (desc.slope, desc.intercept);
-        Self { bytes, scalar: desc.scalar, row: nx, slice: nx * ny, components: desc.components, slope, intercept }
+        Self {
+            bytes,
+            scalar: desc.scalar,
+            row: nx,
+            slice: nx * ny,
+            components: desc.components,
+            slope: desc.slope,
+            intercept: desc.intercept,
+            roi: texture.data_roi(),
+            nearest: texture.filter() == Filter::Nearest,
+        }
     }
 
     /// The value at a sample in data units, to the bit that of [`volact_core::Volume::value`].
@@ -185,6 +203,37 @@ impl<'a> Voxels<'a> {
         let index = (z * self.slice + y * self.row + x) * self.components + component;
         self.scalar.read(self.bytes, index) * self.slope + self.intercept
     }
+}
+
+/// A table's control points in rising order.
+fn knots(table: &ResolvedTable) -> Knots {
+    let mut points = table.points().to_vec();
+    points.sort_by(|a, b| a.value.total_cmp(&b.value));
+    Knots::new(points)
+}
+
+/// `attribute`: colour from the scalars, opacity from the same or others, by the same or another
+/// table.
+fn attribute_fields(shape: &ResolvedShape, component: usize) -> Option<Vec<Field>> {
+    let scalars = shape.attribute("scalars")?;
+    let table = shape.table("lookup_table")?;
+    let field = |table: &LookupTable, attribute: &Attribute, source, drives| {
+        let component = if let Source::Scalars(c) = source { c } else { 0 };
+        // As of a texture of floats.
+        let range = match attribute.range(component) {
+            Some([a, b]) if a < b => [a, b],
+            Some([a, _]) => [a, a + 1.0],
+            None => [0.0, 1.0],
+        };
+        Field { source, knots: knots(&table.resolve(range)), drives }
+    };
+    let (others, other_table) = (shape.attribute("opacity_scalars"), shape.table("opacity_table"));
+    if others.is_none() && other_table.is_none() {
+        return Some(vec![field(table, scalars, Source::Scalars(component), [true; 4])]);
+    }
+    let color = field(table, scalars, Source::Scalars(component), [true, true, true, false]);
+    let source = if others.is_some() { Source::OpacityScalars } else { Source::Scalars(component) };
+    Some(vec![color, field(other_table.unwrap_or(table), others.unwrap_or(scalars), source, only(3))])
 }
 
 fn only(channel: usize) -> [bool; 4] {

@@ -9,7 +9,7 @@ use std::{
     thread,
 };
 
-use volact_core::{ActionError, Compositing, FrameDesc, Ray, RayGrid, Viewport, resolve::ResolvedShape};
+use volact_core::{ActionError, Compositing, FrameDesc, Ray, RayGrid, Viewport, VolumeTexture, resolve::ResolvedShape};
 
 use super::{
     cells::Grid,
@@ -54,6 +54,7 @@ pub struct ReferencePicture {
 /// A shape made ready.
 struct Prepared {
     medium: Medium,
+    texture: VolumeTexture,
     grid: Grid,
     place: Place,
     /// Shapes with the same number have the same place.
@@ -112,6 +113,7 @@ fn prepare(shapes: &[ResolvedShape], options: &ReferenceOptions) -> Result<Vec<P
     for shape in shapes {
         check(shape)?;
         let (Some(medium), Some(block)) = (Medium::new(shape), shape.block()) else { continue };
+        let Some(texture) = shape.volume("volume").cloned() else { continue };
         let compositing = shape.compositing();
         let exact = options.method == Method::Exact;
         if !exact {
@@ -123,11 +125,11 @@ fn prepare(shapes: &[ResolvedShape], options: &ReferenceOptions) -> Result<Vec<P
                 return Err(ActionError::Limit { action: NAME.into(), what, found: format!("{count:e}"), wanted });
             }
         }
-        let grid = Grid::new(&medium, exact && compositing == Compositing::Over);
-        let place = Place { to_object: shape.to_object, to_index: medium.texture.object_to_index(), block };
+        let grid = Grid::new(&medium, &Voxels::new(&texture), exact && compositing == Compositing::Over);
+        let place = Place { to_object: shape.to_object, to_index: texture.object_to_index(), block };
         let same = |p: &&Prepared| p.place.to_object == place.to_object && p.place.block == block;
         let place_number = prepared.iter().find(same).map_or(prepared.len(), |p| p.place_number);
-        prepared.push(Prepared { medium, grid, place, place_number, compositing });
+        prepared.push(Prepared { medium, texture, grid, place, place_number, compositing });
     }
     Ok(prepared)
 }
@@ -221,7 +223,7 @@ impl Scene<'_> {
     }
 
     fn flat(&self, ray: &Ray, shape: &Prepared, line: &Line) -> (Light, u64) {
-        let voxels = Voxels::new(&shape.medium.texture);
+        let voxels = Voxels::new(&shape.texture);
         let (gathered, samples) = match self.counting(ray) {
             None => flat::gather(&shape.medium, &shape.grid, &voxels, line),
             Some(counting) => {
@@ -259,7 +261,7 @@ impl Scene<'_> {
         cutter: &mut Cutter,
         mut visit: impl FnMut(&Piece) -> bool,
     ) {
-        let voxels = Voxels::new(&shape.medium.texture);
+        let voxels = Voxels::new(&shape.texture);
         match counting {
             None => shape.grid.walk(line, |cell| cutter.cut(&shape.medium, &voxels, line, cell, &mut visit)),
             Some(counting) if self.options.classification == Classification::Post => {

@@ -18,6 +18,30 @@ use super::{
     medium::{Field, Medium, Voxels},
 };
 
+/// A stretch of a ray on which every field is one polynomial.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stretch {
+    /// Where it begins and ends.
+    pub t: [f64; 2],
+    /// Bound on the error of an end that counts as loose.
+    pub dt: f64,
+    /// Whether something else begins at the ends, so that their place matters.
+    pub loose: [bool; 2],
+    /// Whether all ends of pieces are loose, too: between cells of the nearest filter.
+    pub apart: bool,
+}
+
+/// A field that is linear on a stretch.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Linear {
+    /// At both ends.
+    pub values: [f64; 2],
+    /// What bounds it, beyond the stretch, too.
+    pub range: [f64; 2],
+    /// Bound on its error.
+    pub error: f64,
+}
+
 /// What a piece absorbs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
@@ -124,41 +148,41 @@ impl Cutter {
         for (i, field) in medium.fields.iter().enumerate() {
             locals[i] = Some(local(field, &corners[i], line, cell));
         }
-        self.visit_pieces(medium, &locals[..count], line, cell, &mut visit)
+        let stretch = Stretch { t: cell.t, dt: line.dt, loose: cell.ends, apart: voxels.nearest };
+        self.visit_pieces(medium, &locals[..count], &stretch, &mut visit)
     }
 
-    /// Visits the pieces of a stretch on which every field is linear between two values.
+    /// Visits the pieces of a stretch on which every field is linear; one for each of the medium's
+    /// fields is looked at.
     pub fn cut_linear(
         &mut self,
         medium: &Medium,
-        line: &Line,
-        cell: &Cell,
-        values: [[f64; 4]; 2],
+        stretch: &Stretch,
+        linear: &[Linear],
         mut visit: impl FnMut(&Piece) -> bool,
     ) -> bool {
         let mut locals = [None; 4];
-        for (i, field) in medium.fields.iter().enumerate() {
-            let (a, b) = (values[0][i], values[1][i]);
-            let (low, high) = (field.knots.segment_of(a.min(b)), field.knots.segment_of(a.max(b)));
-            let range = [a.min(b), a.max(b)];
+        for (i, (field, linear)) in medium.fields.iter().zip(linear).enumerate() {
+            let Linear { values: [a, b], range, error } = *linear;
+            let (low, high) = (field.knots.segment_of(range[0]), field.knots.segment_of(range[1]));
             let (value, segment) = ([0.0, b - a, 0.0, 0.0], (low == high).then_some(low));
-            locals[i] = Some(Local { field, value, origin: a, range, error: 4.0 * EPS * (b - a).abs(), segment });
+            let error = error + 4.0 * EPS * (b - a).abs();
+            locals[i] = Some(Local { field, value, origin: a, range, error, segment });
         }
-        self.visit_pieces(medium, &locals[..medium.fields.len()], line, cell, &mut visit)
+        self.visit_pieces(medium, &locals[..medium.fields.len()], stretch, &mut visit)
     }
 
     fn visit_pieces(
         &mut self,
         medium: &Medium,
         locals: &[Option<Local<'_>>],
-        line: &Line,
-        cell: &Cell,
+        stretch: &Stretch,
         visit: &mut impl FnMut(&Piece) -> bool,
     ) -> bool {
         self.find_cuts(locals);
         for i in 1..self.cuts.len() {
             let (a, b) = (self.cuts[i - 1], self.cuts[i]);
-            if b > a && !visit(&piece(medium, locals, line, cell, [a, b])) {
+            if b > a && !visit(&piece(medium, locals, stretch, [a, b])) {
                 return false;
             }
         }
@@ -210,16 +234,16 @@ fn local<'a>(field: &'a Field, corner: &[f64; 8], line: &Line, cell: &Cell) -> L
     Local { field, value, origin, range, error, segment }
 }
 
-fn piece(medium: &Medium, locals: &[Option<Local<'_>>], line: &Line, cell: &Cell, s: [f64; 2]) -> Piece {
-    let span = cell.t[1] - cell.t[0];
-    let at = |s: f64| if s == 1.0 { cell.t[1] } else { cell.t[0] + span * s };
+fn piece(medium: &Medium, locals: &[Option<Local<'_>>], stretch: &Stretch, s: [f64; 2]) -> Piece {
+    let [start, end] = stretch.t;
+    let at = |s: f64| if s == 1.0 { end } else { start + (end - start) * s };
     let mut made = Piece::constant([at(s[0]), at(s[1])], [0.0, 0.0, 0.0, 1.0], medium.unit);
     for local in locals.iter().flatten() {
         classify(&mut made, local, s);
     }
-    let ends = [cell.ends[0] && s[0] == 0.0, cell.ends[1] && s[1] == 1.0];
-    let loose = if medium.is_nearest() { [s[0] == 0.0, s[1] == 1.0] } else { ends };
-    loosen_ends(&mut made, loose, line.dt);
+    let outer = [s[0] == 0.0, s[1] == 1.0];
+    let loose = [0, 1].map(|i| outer[i] && (stretch.apart || stretch.loose[i]));
+    loosen_ends(&mut made, loose, stretch.dt);
     made
 }
 
