@@ -3,27 +3,45 @@
 use std::path::Path;
 
 use volact_core::{
-    Declaration, LoadError, LoadOptions, Loader, ParameterDecl, ParameterType, ParameterValue, VolumeReader,
+    Declaration, LoadError, LoadOptions, Loader, MeshData, ParameterDecl, ParameterType, ParameterValue, Progress,
+    VolumeReader,
     glam::DVec3,
-    loader::{Confidence, Probe},
+    loader::{Confidence, Content, Probe},
     parameter::Kind,
 };
 
 use crate::storage::Storage;
 
+type Recognise = fn(&Probe<'_>) -> Confidence;
 type Open = fn(&Storage, &Path, &LoadOptions) -> Result<Box<dyn VolumeReader>, LoadError>;
+type ReadMesh = fn(&Storage, &Path, &LoadOptions, &dyn Progress) -> Result<MeshData, LoadError>;
+
+enum Read {
+    Volume(Open),
+    Mesh(ReadMesh),
+}
 
 /// A loader made of a declaration and two functions.
 pub(crate) struct Format {
     declaration: Declaration,
-    probe: fn(&Probe<'_>) -> Confidence,
-    open: Open,
+    probe: Recognise,
+    read: Read,
 }
 
 impl Format {
-    pub(crate) fn new(name: &str, description: &str, probe: fn(&Probe<'_>) -> Confidence, open: Open) -> Self {
+    /// A format of volumes.
+    pub(crate) fn new(name: &str, description: &str, probe: Recognise, open: Open) -> Self {
+        Self::of(name, description, probe, Read::Volume(open))
+    }
+
+    /// A format of meshes or surfaces.
+    pub(crate) fn of_meshes(name: &str, description: &str, probe: Recognise, read: ReadMesh) -> Self {
+        Self::of(name, description, probe, Read::Mesh(read))
+    }
+
+    fn of(name: &str, description: &str, probe: Recognise, read: Read) -> Self {
         let declaration = Declaration::new(Kind::Loader, name, env!("CARGO_PKG_VERSION"), description);
-        Self { declaration, probe, open }
+        Self { declaration, probe, read }
     }
 
     pub(crate) fn with(mut self, option: ParameterDecl) -> Self {
@@ -41,7 +59,29 @@ impl Format {
         path: &Path,
         options: &LoadOptions,
     ) -> Result<Box<dyn VolumeReader>, LoadError> {
-        (self.open)(storage, path, options)
+        match self.read {
+            Read::Volume(open) => open(storage, path, options),
+            Read::Mesh(_) => {
+                let (what, cure) = (format!("a volume by loader {:?}", self.name()), "it reads meshes".into());
+                Err(LoadError::Unsupported { path: path.into(), what, cure })
+            }
+        }
+    }
+
+    pub(crate) fn read_mesh_in(
+        &self,
+        storage: &Storage,
+        path: &Path,
+        options: &LoadOptions,
+        progress: &dyn Progress,
+    ) -> Result<MeshData, LoadError> {
+        match self.read {
+            Read::Mesh(read) => read(storage, path, options, progress),
+            Read::Volume(_) => {
+                let (what, cure) = (format!("a mesh by loader {:?}", self.name()), "it reads volumes".into());
+                Err(LoadError::Unsupported { path: path.into(), what, cure })
+            }
+        }
     }
 }
 
@@ -55,7 +95,18 @@ impl Loader for Format {
     }
 
     fn open(&self, path: &Path, options: &LoadOptions) -> Result<Box<dyn VolumeReader>, LoadError> {
-        (self.open)(&Storage::Disk, path, options)
+        self.open_in(&Storage::Disk, path, options)
+    }
+
+    fn content(&self) -> Content {
+        match self.read {
+            Read::Volume(_) => Content::Volume,
+            Read::Mesh(_) => Content::Mesh,
+        }
+    }
+
+    fn read_mesh(&self, path: &Path, options: &LoadOptions, progress: &dyn Progress) -> Result<MeshData, LoadError> {
+        self.read_mesh_in(&Storage::Disk, path, options, progress)
     }
 }
 

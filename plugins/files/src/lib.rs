@@ -1,4 +1,4 @@
-//! File formats for Volact: volumes in, pictures out.
+//! File formats for Volact: volumes and meshes in, pictures out.
 //!
 //! [`loaders`] gives every format as a [`Loader`] for a registry. Each module says what it reads,
 //! which options it takes and where its limits are.
@@ -15,9 +15,11 @@ mod dicom;
 mod elements;
 mod fields;
 mod format;
+mod mesh;
 mod metaimage;
 mod nifti;
 mod nrrd;
+mod numbers;
 mod payload;
 pub mod picture;
 mod png_series;
@@ -28,11 +30,16 @@ mod storage;
 mod tiff_pages;
 mod vti;
 mod vtk;
+mod vtk_arrays;
+mod vtk_blocks;
+mod vtk_xml;
+mod vts;
+mod vtu;
 mod world;
 
 use std::{path::Path, sync::Arc};
 
-use volact_core::{LoadError, LoadOptions, Loader, VolumeReader, names};
+use volact_core::{LoadError, LoadOptions, Loader, MeshData, Progress, VolumeReader, names};
 
 pub use storage::Storage;
 
@@ -48,11 +55,14 @@ fn formats() -> Vec<Format> {
         png_series::format(),
         vtk::format(),
         vti::format(),
+        vtu::format(),
+        vts::format(),
         raw::format(),
     ]
 }
 
-/// All loaders of this crate: nrrd, metaimage, nifti, dicom, tiff, png, vtk, vti and raw.
+/// All loaders of this crate: of volumes nrrd, metaimage, nifti, dicom, tiff, png, vtk, vti and raw,
+/// of meshes vtu and vts.
 pub fn loaders() -> Vec<Arc<dyn Loader>> {
     formats().into_iter().map(|format| Arc::new(format) as Arc<dyn Loader>).collect()
 }
@@ -67,18 +77,37 @@ pub fn open_in(
     path: &Path,
     options: &LoadOptions,
 ) -> Result<Box<dyn VolumeReader>, LoadError> {
-    let formats = formats();
-    let names = || formats.iter().map(Format::name);
-    let Some(format) = formats.iter().find(|f| f.name() == loader) else {
-        return Err(LoadError::UnknownLoader {
-            name: loader.into(),
-            hint: names::hint(loader, names()),
-            known: names().collect::<Vec<_>>().join(", "),
-        });
+    let (format, options) = resolve(loader, options)?;
+    format.open_in(storage, path, &options)
+}
+
+/// Reads a mesh of a [`Storage`] with the loader of that name, as [`Loader::read_mesh`] does on
+/// disk.
+///
+/// # Errors
+/// As [`Loader::read_mesh`], and if no loader has that name or an option is wrong.
+pub fn read_mesh_in(
+    storage: &Storage,
+    loader: &str,
+    path: &Path,
+    options: &LoadOptions,
+    progress: &dyn Progress,
+) -> Result<MeshData, LoadError> {
+    let (format, options) = resolve(loader, options)?;
+    format.read_mesh_in(storage, path, &options, progress)
+}
+
+fn resolve(loader: &str, options: &LoadOptions) -> Result<(Format, LoadOptions), LoadError> {
+    let mut formats = formats();
+    let Some(at) = formats.iter().position(|f| f.name() == loader) else {
+        let names = || formats.iter().map(Format::name);
+        let (hint, known) = (names::hint(loader, names()), names().collect::<Vec<_>>().join(", "));
+        return Err(LoadError::UnknownLoader { name: loader.into(), hint, known });
     };
+    let format = formats.swap_remove(at);
     let options = format.declaration().resolve(options, |_| false).map_err(|problems| LoadError::Options {
         loader: loader.into(),
         problem: problems.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "),
     })?;
-    format.open_in(storage, path, &options)
+    Ok((format, options))
 }

@@ -14,7 +14,7 @@ use volact_core::{Buffer, LoadError, Progress, Region, ScalarType, VolumeDesc, V
 use crate::storage::{Input, Storage};
 
 /// Raw files of at least that many bytes are mapped instead of read.
-const MAP_FROM: usize = 1 << 20;
+pub(crate) const MAP_FROM: usize = 1 << 20;
 /// Bytes between two calls of progress.
 const CHUNK: usize = 1 << 20;
 
@@ -227,7 +227,7 @@ pub(crate) fn reserve(path: &Path, bytes: usize) -> Result<Vec<u8>, LoadError> {
     Ok(out)
 }
 
-fn out_of_memory(path: &Path, bytes: usize) -> LoadError {
+pub(crate) fn out_of_memory(path: &Path, bytes: usize) -> LoadError {
     let cure = "read it region by region".into();
     LoadError::Unsupported { path: path.into(), what: format!("a region of {bytes} bytes in this memory"), cure }
 }
@@ -510,7 +510,7 @@ fn bad_number(index: u64, word: &str, wanted: &str) -> io::Error {
 }
 
 /// Appends a number given as text to `out` in native byte order.
-fn parse_number(word: &str, scalar: ScalarType, out: &mut Vec<u8>) -> bool {
+pub(crate) fn parse_number(word: &str, scalar: ScalarType, out: &mut Vec<u8>) -> bool {
     macro_rules! put {
         ($t:ty) => {
             word.parse::<$t>().map(|v| out.extend_from_slice(&v.to_ne_bytes())).is_ok()

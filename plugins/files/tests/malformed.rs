@@ -244,7 +244,7 @@ const MESSAGES: &[(&str, &str, &str)] = &[
     ("vti", "no base64", "v.vti: cannot be decoded: Invalid symbol 33, offset 2."),
     ("vti", "fewer bytes than the grid", r#"v.vti: array "s" is 3 bytes, wanted 60 bytes"#),
     ("vti", "base64 cut", "v.vti: holds 6 bytes of base64 data, wanted 64"),
-    ("vti", "lzma", r#"v.vti: compressor "vtkLZMADataCompressor" is not supported; save it with zlib or uncompressed"#),
+    ("vti", "lzma", r#"v.vti: compressor "vtkLZMADataCompressor" is not supported; save it with zlib, with LZ4 or uncompressed"#),
     (
         "vti",
         "2^32 blocks",

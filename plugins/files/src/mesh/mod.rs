@@ -1,0 +1,59 @@
+//! What the formats of meshes share: vertices, cells and attributes, checked and named in errors.
+
+mod attributes;
+mod cells;
+mod structured;
+mod vertices;
+
+use std::path::Path;
+
+use volact_core::{LoadError, Progress, Warning, WarningCode};
+
+use crate::storage::Storage;
+
+pub(crate) use attributes::{Attributes, Named};
+pub(crate) use cells::{CellArrays, CellLayout, Cells};
+pub(crate) use structured::{Blanking, structured};
+pub(crate) use vertices::{check_count, finite_points};
+
+/// A warning about a file's content.
+pub(crate) fn note(file: &str, message: impl Into<String>) -> Warning {
+    Warning::new(WarningCode::FileContent, file, message)
+}
+
+/// Progress in equal steps, counted in the file's bytes.
+pub(crate) struct Meter<'a> {
+    path: &'a Path,
+    progress: &'a dyn Progress,
+    total: u64,
+    steps: u64,
+    done: u64,
+}
+
+impl<'a> Meter<'a> {
+    pub(crate) fn new(
+        storage: &Storage,
+        path: &'a Path,
+        progress: &'a dyn Progress,
+        steps: usize,
+    ) -> Result<Self, LoadError> {
+        Ok(Self { path, progress, total: storage.length(path)?, steps: steps.max(1) as u64, done: 0 })
+    }
+
+    /// A step is done.
+    pub(crate) fn step(&mut self) -> Result<(), LoadError> {
+        self.done = (self.done + 1).min(self.steps);
+        self.tell(0, 1)
+    }
+
+    /// So much of the step under way is done.
+    pub(crate) fn tell(&self, part: u64, of: u64) -> Result<(), LoadError> {
+        let share = self.done as f64 + if part < of { part as f64 / of as f64 } else { 0.0 };
+        let done =
+            if self.done == self.steps { self.total } else { (self.total as f64 * share / self.steps as f64) as u64 };
+        if self.progress.advance(done.min(self.total), self.total) {
+            return Ok(());
+        }
+        Err(LoadError::Stopped { path: self.path.into() })
+    }
+}
