@@ -4,10 +4,14 @@
 use std::path::Path;
 
 use volact_core::{
-    Camera, Registry, View,
+    Camera, ClipRegion, Registry, SliceStyle, View,
+    camera::DepthRange,
     glam::{DAffine3, DVec3},
     loader::NoProgress,
-    scene::{AttributeValues, CameraSpec, GeometrySpec, ParameterSpec, Scene, SceneFile, TableEntries, TransformStep},
+    scene::{
+        AttributeValues, CameraSpec, GeometrySpec, OpaqueDepthSpec, ParameterSpec, Scene, SceneFile, TableEntries,
+        TransformStep,
+    },
 };
 
 /// A scene that is right, into which the tests put what is wrong.
@@ -41,7 +45,7 @@ const WRONG: &[(&str, &str, &str)] = &[
     ("data", "file: \"a\", spacing: (1, 1)", "1:50: data.head.spacing: found a tuple of 2 values, wanted three numbers (x, y, z)"),
     ("data", "file: \"a\", slope: 0", "1:48: data.head.slope: found 0, wanted a finite number other than 0"),
     ("data", "file: \"a\", intercept: NaN", "1:52: data.head.intercept: found NaN, wanted a finite number"),
-    ("shader", "\"lit\"", "2:19: shapes[0].shader: found \"lit\", wanted a registered shader: average, lut, minip, mip, simple, xray; did you mean \"lut\"?"),
+    ("shader", "\"lit\"", "2:19: shapes[0].shader: found \"lit\", wanted a registered shader: attribute, average, lut, minip, mip, simple, surface, xray; did you mean \"lut\"?"),
     ("shader", "lut", "2:19: shapes[0].shader: found `lut`, wanted a name of 1 to 128 characters in quotation marks"),
     ("volume", "data: \"haed\"", "2:62: shapes[0].parameters.volume.data: found \"haed\", wanted a name under `data`: head; did you mean \"head\"?"),
     ("volume", "data: \"head\", filter: Nearst", "2:78: shapes[0].parameters.volume.filter: found `Nearst`, wanted one of Linear, Nearest; did you mean \"Nearest\"?"),
@@ -62,13 +66,48 @@ const WRONG: &[(&str, &str, &str)] = &[
     ("parameter", ", 3: 0", "2:135: shapes[0].parameters: found 3, wanted a name in quotation marks"),
     ("shape", "name: \"\", ", "2:17: shapes[0].name: found \"\", wanted a name of 1 to 128 characters in quotation marks"),
     ("shape", "geometry: Block(offset: (0, 0, 0), dimensions: (1, 1, -1)), ", "2:65: shapes[0].geometry.dimensions[2]: found -1, wanted a positive, finite number"),
-    ("shape", "geometry: Geometry(name: \"blok\"), ", "2:36: shapes[0].geometry.name: found \"blok\", wanted a registered geometry: block; did you mean \"block\"?"),
+    ("shape", "geometry: Geometry(name: \"blok\"), ", "2:36: shapes[0].geometry.name: found \"blok\", wanted a registered geometry: block, cylinder, sphere; did you mean \"block\"?"),
     ("shape", "geometry: Geometry(name: \"block\", parameters: {\"offset\": (0, 0, 0)}), ", "2:57: shapes[0].geometry.parameters.dimensions: found nothing, wanted vec3: its lengths"),
     ("shape", "transform: Rotate(axis: (0, 0, 0), degrees: 1), ", "2:35: shapes[0].transform.axis: found a tuple of 3 values, wanted a direction with a length"),
     ("shape", "transform: [Translate(1, 2)], ", "2:23: shapes[0].transform[0]: found `Translate(…)`, wanted Translate(x, y, z)"),
     ("shape", "transform: Scale(0), ", "2:28: shapes[0].transform[0]: found 0, wanted a finite number other than 0"),
     ("shape", "transform: Matrix((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 0, 0), (0, 0, 0, 1)), ", "2:22: shapes[0].transform: found `Matrix(…)`, wanted a matrix that can be inverted"),
     ("shape", "transform: Matrix((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 1, 1)), ", "2:22: shapes[0].transform: found `Matrix(…)`, wanted an affine map: a last row of (0, 0, 0, 1)"),
+    ("shape", "geometry: Blok(), ", "2:21: shapes[0].geometry: found `Blok`, wanted one of Around, Block, Mesh, StructuredMesh, Sphere, Cylinder, Geometry; did you mean \"Block\"?"),
+    ("shape", "geometry: Mesh(data: \"haed\"), ", "2:32: shapes[0].geometry.data: found \"haed\", wanted a name under `data`: head; did you mean \"head\"?"),
+    ("shape", "geometry: Mesh(data: \"head\", points: []), ", "2:48: shapes[0].geometry.points: found a list of 0 values, wanted nothing: `data` gives the whole mesh"),
+    ("shape", "geometry: Mesh(tetrahedra: []), ", "2:21: shapes[0].geometry.points: found nothing, wanted the vertices, [(x, y, z), …], or the name of `data` that has them"),
+    ("shape", "geometry: Mesh(points: [(0, 0, 0), (1, 0, 0)]), ", "2:21: shapes[0].geometry: found `Mesh(…)`, wanted cells: `tetrahedra`, `hexahedra`, `wedges`, `pyramids`, or `triangles`"),
+    ("shape", "geometry: Mesh(points: [(0, 0, 0), (1, 0, inf)], tetrahedra: []), ", "2:53: shapes[0].geometry.points[1][2]: found inf, wanted a finite number"),
+    ("shape", "geometry: Mesh(points: [(0, 0, 0), (1, 0, 0)], tetrahedra: [[0, 1, 2, 1]]), ", "2:78: shapes[0].geometry.tetrahedra[0][2]: found 2, wanted the index of one of the 2 points, from 0 on"),
+    ("shape", "geometry: Mesh(points: [], tetrahedra: [[0, 1, 2, 3]]), ", "2:52: shapes[0].geometry.tetrahedra[0][0]: found 0, wanted the index of one of the 0 points, from 0 on\n2:55: shapes[0].geometry.tetrahedra[0][1]: found 1, wanted the index of one of the 0 points, from 0 on\n2:58: shapes[0].geometry.tetrahedra[0][2]: found 2, wanted the index of one of the 0 points, from 0 on\n2:61: shapes[0].geometry.tetrahedra[0][3]: found 3, wanted the index of one of the 0 points, from 0 on"),
+    ("shape", "geometry: Mesh(points: File(\"a\"), hexahedra: [[0, 1, 2, -1, 4, 5, 6, 7]]), ", "2:67: shapes[0].geometry.hexahedra[0][3]: found -1, wanted the index of a vertex"),
+    ("shape", "geometry: Mesh(points: File(\"a\"), wedges: [[0, 1, 2]]), ", "2:54: shapes[0].geometry.wedges[0]: found a list of 3 values, wanted the indices of 6 vertices, [index, …]"),
+    ("shape", "geometry: Mesh(points: File(\"a\"), pyramids: [(0, 1, 2, 3, 4)]), ", "2:56: shapes[0].geometry.pyramids[0]: found a tuple of 5 values, wanted the indices of 5 vertices, [index, …]"),
+    ("shape", "geometry: Mesh(points: File(\"a\"), tetrahedra: [[0, 1, 2, 3]], triangles: [[0, 1, 2]]), ", "2:21: shapes[0].geometry: found `Mesh(…)`, wanted triangles by themselves, without cells and texture coordinates: a surface holds no volume"),
+    ("shape", "geometry: Mesh(points: [(0, 0, 0)], texture_coordinates: [], tetrahedra: [[0, 0, 0, 0]]), ", "2:68: shapes[0].geometry.texture_coordinates: found a list of 0 values, wanted 1 points, one for each vertex"),
+    ("shape", "geometry: StructuredMesh(dims: (2, 2, 1), points: File(\"a\")), ", "2:49: shapes[0].geometry.dims[2]: found 1, wanted a whole number from 2 on"),
+    ("shape", "geometry: StructuredMesh(dims: (4294967296, 4294967296, 2), points: File(\"a\")), ", "2:42: shapes[0].geometry.dims: found a tuple of 3 values, wanted at most 4294967295 vertices"),
+    ("shape", "geometry: StructuredMesh(dims: (2, 2, 2), points: [(0, 0, 0)]), ", "2:61: shapes[0].geometry.points: found a list of 1 value, wanted 8 points, one for each vertex of the grid"),
+    ("shape", "geometry: StructuredMesh(dims: (2, 2, 2), points: File(3)), ", "2:66: shapes[0].geometry.points[0]: found 3, wanted a text in quotation marks"),
+    ("shape", "geometry: Sphere(center: (0, 0, 0), radius: 0), ", "2:55: shapes[0].geometry.radius: found 0, wanted a positive, finite number"),
+    ("shape", "geometry: Sphere(center: (0, 0, 0), radius: 1, segments: 2), ", "2:68: shapes[0].geometry.segments: found 2, wanted a whole number from 3 to 1024"),
+    ("shape", "geometry: Cylinder(start: (0, 0, 1), end: (0, 0, 1), radius: 1), ", "2:53: shapes[0].geometry.end: found a tuple of 3 values, wanted another end than `start`"),
+    ("shape", "slices: (planes: []), ", "2:28: shapes[0].slices.planes: found a list of 0 values, wanted at least one plane"),
+    ("shape", "slices: (planes: [Plane(point: (0, 0, 0), normal: (0, 0, 0))]), ", "2:61: shapes[0].slices.planes[0].normal: found a tuple of 3 values, wanted a direction with a length"),
+    ("shape", "slices: (planes: [Plane(point: (0, 0, 0), normal: (0, 0, 1))], style: Opaqe), ", "2:81: shapes[0].slices.style: found `Opaqe`, wanted one of Opaque, Blended; did you mean \"Opaque\"?"),
+    ("shape", "slices: (style: Opaque), ", "2:19: shapes[0].slices.planes: found nothing, wanted planes, [Plane(point: (x, y, z), normal: (x, y, z)), …]"),
+    ("shape", "clip: Plane(point: (0, 0, 0), normal: (1, 0, 0)), ", "2:17: shapes[0].clip: found `Plane(…)`, wanted a list of Plane(…), Planes([…]), Box(…) or Cut(…)"),
+    ("shape", "clip: [Sphere(center: (0, 0, 0), radius: 1)], ", "2:18: shapes[0].clip[0]: found `Sphere(…)`, wanted one of Plane, Planes, Box, Cut"),
+    ("shape", "clip: [Cut(Box(min: (0, 0, 0), max: (1, 0, 1)))], ", "2:22: shapes[0].clip[0][0]: found `Box(…)`, wanted `min` below `max` along each axis"),
+    ("parameter", ", \"scalars\": Attribute(data: \"haed\", name: \"t\")", "2:162: shapes[0].parameters.scalars.data: found \"haed\", wanted a name under `data`: head; did you mean \"head\"?"),
+    ("parameter", ", \"scalars\": Attribute(data: \"head\", name: \"t\", values: [1])", "2:189: shapes[0].parameters.scalars.values: found a list of 1 value, wanted nothing: `data` gives the numbers"),
+    ("parameter", ", \"scalars\": Attribute(name: \"t\", values: [1], component: 0)", "2:191: shapes[0].parameters.scalars.component: found 0, wanted nothing: `component` picks from the numbers of `data`"),
+    ("rest", "clip: [Planes([])]", "3:15: clip[0][0]: found a list of 0 values, wanted at least one plane"),
+    ("rest", "opaque: (color: \"a\")", "3:9: opaque: found a struct without a name, wanted `depth`, a file of distances, or a `depth_buffer`"),
+    ("rest", "opaque: (depth: 3)", "3:17: opaque.depth: found 3, wanted a text in quotation marks"),
+    ("rest", "opaque: (depth_buffer: (file: \"a\"))", "3:24: opaque.depth_buffer.world_to_clip: found nothing, wanted four rows of four numbers, ((a, b, c, d), …)"),
+    ("rest", "opaque: (depth_buffer: (file: \"a\", world_to_clip: ((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 0, 0), (0, 0, 0, 1))))", "3:51: opaque.depth_buffer.world_to_clip: found a tuple of 4 values, wanted a matrix that can be inverted"),
     ("rest", "camera: View(\"izo\")", "3:14: camera[0]: found \"izo\", wanted one of front, back, left, right, top, bottom, iso; did you mean \"iso\"?"),
     ("rest", "camera: Perspectiv(eye: (0, 0, 0))", "3:9: camera: found `Perspectiv(…)`, wanted one of View, Perspective, Orthographic, Matrices; did you mean \"Perspective\"?"),
     ("rest", "camera: Perspective(eye: (0, -1, 0), target: (0, 0, 0), fov_y: 180)", "3:64: camera.fov_y: found 180, wanted above 0 and below 180 degrees"),
@@ -81,7 +120,7 @@ const WRONG: &[(&str, &str, &str)] = &[
     ("rest", "image: (depth_threshold: 0)", "3:26: image.depth_threshold: found 0, wanted above 0 and at most 1"),
     ("rest", "action: \"nul\"", "3:9: action.name: found \"nul\", wanted a registered action: checked, null; did you mean \"null\"?"),
     ("rest", "action: (name: \"null\", options: {\"threads\": 2})", "3:45: action.options.threads: found a parameter that nobody declares, wanted no parameters, for action \"null\" has none"),
-    ("rest", "actoin: \"null\"", "3:1: found field `actoin`, wanted version, data, shapes, camera, image, action; did you mean \"action\"?"),
+    ("rest", "actoin: \"null\"", "3:1: found field `actoin`, wanted version, data, shapes, clip, opaque, camera, image, action; did you mean \"action\"?"),
     ("rest", "camera: (", "3:11: found the end of the text, wanted `,` or `)`"),
 ];
 
@@ -160,10 +199,10 @@ fn defaults_stated_equal_defaults_left_out() {
         "volume": Volume(data: "a"), "lookup_table": Table(points: [(0, (0, 0, 0), 0)])})])"#;
     let long = r#"Scene(version: 1, data: {"a": Data(file: "a", loader: None, options: {}, spacing: None, placement: None,
         slope: None, intercept: None, unit: None)},
-        shapes: [Shape(name: None, geometry: Around, shader: "lut", transform: None, parameters: {
+        shapes: [Shape(name: None, geometry: Around, shader: "lut", transform: None, slices: None, clip: [], parameters: {
         "volume": Volume(data: Some("a"), data_roi: None, geometry_roi: None, range: None, filter: Linear, luminance: false),
         "lookup_table": Table(points: [(value: 0, color: (0, 0, 0), opacity: 0)], pre_interpolated: false)})],
-        camera: None, image: Image(size: None, viewport: None, background: None, depth_threshold: None), action: None)"#;
+        clip: [], opaque: None, camera: None, image: Image(size: None, viewport: None, background: None, depth_threshold: None), action: None)"#;
     assert_eq!(SceneFile::parse(short).unwrap(), SceneFile::parse(long).unwrap());
 }
 
@@ -171,7 +210,7 @@ fn defaults_stated_equal_defaults_left_out() {
 fn everything_can_be_said() {
     let text = include_str!("full_scene.ron");
     let scene = SceneFile::parse(text).unwrap_or_else(|p| panic!("{p}"));
-    assert_eq!(scene.shapes.len(), 3);
+    assert_eq!(scene.shapes.len(), 9);
     let Some(CameraSpec::Camera(Camera::Matrices { view, .. })) = scene.camera else { panic!("{:?}", scene.camera) };
     assert_eq!(view.w_axis.z, -5.0);
     assert_eq!(scene.shapes[1].transform.as_ref().unwrap()[1], TransformStep::Scale(DVec3::splat(2.0)));
@@ -185,6 +224,15 @@ fn everything_can_be_said() {
         panic!("an attribute")
     };
     assert_eq!(attribute.values, AttributeValues::Inline(vec![1.0, 2.0, 3.0, 4.0]));
+    let slices = scene.shapes[3].slices.as_ref().unwrap();
+    assert_eq!((slices.planes.len(), slices.style, slices.volume), (2, SliceStyle::Blended, true));
+    let clip = &scene.shapes[3].clip;
+    assert_eq!(clip.regions().iter().map(|r| r.bounding_planes().len()).collect::<Vec<_>>(), [1, 2, 6, 1]);
+    assert_eq!(clip.regions().iter().map(ClipRegion::keeps_inside).collect::<Vec<_>>(), [true, true, true, false]);
+    let GeometrySpec::Mesh(mesh) = &scene.shapes[4].geometry else { panic!("a mesh") };
+    assert_eq!((mesh.tetrahedra.len(), mesh.pyramids.len(), mesh.wedges.len(), mesh.hexahedra.len()), (1, 1, 1, 1));
+    assert!(matches!(&scene.shapes[7].geometry, GeometrySpec::Surface { triangles, .. } if triangles.len() == 1));
+    assert!(matches!(&scene.opaque.unwrap().depth, OpaqueDepthSpec::Buffer { range: DepthRange::MinusOneToOne, .. }));
 }
 
 #[test]
@@ -279,8 +327,11 @@ fn documented_examples_are_right() {
             let config = volact_core::config::Config::parse(block);
             config.map(|config| assert_eq!(config.prefer, volact_core::config::PREFERRED))
         } else {
-            let camera =
-                |line: &str| SceneFile::parse(&format!("(version: 1, shapes: [], camera: {line}\n)")).map(|_| ());
+            // Cameras stand by themselves there, and opaque pictures with their field's name.
+            let camera = |line: &str| {
+                let field = if line.starts_with("opaque: ") { "" } else { "camera: " };
+                SceneFile::parse(&format!("(version: 1, shapes: [], {field}{line}\n)")).map(|_| ())
+            };
             let row = "((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1))";
             let lines = block.lines().map(|line| line.replace("((…), (…), (…), (…))", row));
             lines.into_iter().try_for_each(|line| camera(&line))
@@ -288,5 +339,5 @@ fn documented_examples_are_right() {
         assert_eq!(read_as.map_err(|p| p.to_string()), Ok(()), "{block}");
         read += 1;
     }
-    assert_eq!(read, 3);
+    assert_eq!(read, 4);
 }

@@ -1,4 +1,4 @@
-//! From a description to shapes: loads data, each file once, and makes everything.
+//! From a description to shapes and a frame. `data` loads what they need, `meshes` makes geometries.
 
 use std::{
     collections::BTreeMap,
@@ -6,19 +6,18 @@ use std::{
     fs,
     io::Read,
     path::{Path, PathBuf},
-    sync::Arc,
 };
 
 use glam::{DAffine3, DVec3};
 use thiserror::Error as ThisError;
 
 use super::{
-    CameraSpec, DataSpec, GeometrySpec, ParameterSpec, Problem, Problems, SceneFile, ShapeSpec, TransformStep,
-    VolumeSpec, check, document::MAX_BYTES,
+    CameraSpec, Folders, OpaqueDepthSpec, OpaqueSpec, ParameterSpec, Problem, Problems, SceneFile, ShapeSpec,
+    TransformStep, check, document::MAX_BYTES, values,
 };
 use crate::{
-    Appearance, Block, FrameDesc, Geometry, Options, ParameterDecl, ParameterValue, Progress, Registry, Shape, Volume,
-    VolumeTexture, parameter::ParameterMap,
+    Appearance, Data, FrameDesc, Geometry, Opaque, OpaqueDepth, Options, ParameterDecl, ParameterValue, Progress,
+    Registry, Shape, frame::MAX_PIXELS, parameter::ParameterMap,
 };
 
 /// A scene that can be drawn.
@@ -61,19 +60,24 @@ impl SceneFile {
         Ok(Self::parse_with(&text, registry).map_err(named)?)
     }
 
-    /// Loads all data that shapes use and makes the scene. Paths are relative to `base`; files
-    /// that several shapes use are read once.
+    /// Loads all data that shapes use and makes the scene. Files that several shapes use are read
+    /// once.
     ///
     /// # Errors
     /// All problems: of the description against the registry, else of the files and of what the
     /// description says about them.
-    pub fn build(&self, registry: &Registry, base: &Path, progress: &dyn Progress) -> Result<Scene, Problems> {
+    pub fn build<'a>(
+        &self,
+        registry: &Registry,
+        folders: impl Into<Folders<'a>>,
+        progress: &dyn Progress,
+    ) -> Result<Scene, Problems> {
         let mut problems = check::references(self);
         problems.extend(check::check(self, registry));
         if !problems.is_empty() {
             return Err(Problems::new(problems));
         }
-        let mut build = Build { scene: self, registry, base, data: BTreeMap::new(), problems };
+        let mut build = Build { scene: self, registry, folders: folders.into(), data: BTreeMap::new(), problems };
         build.load(progress);
         let shapes: Vec<_> = self.shapes.iter().enumerate().filter_map(|(i, s)| build.shape(i, s)).collect();
         let frame = build.frame(&shapes);
@@ -83,15 +87,29 @@ impl SceneFile {
 }
 
 impl Scene {
-    /// Reads a scene file and everything that it names.
+    /// Reads a scene file and everything that it names beside itself.
     ///
     /// # Errors
     /// As [`SceneFile::open`] and [`SceneFile::build`].
     pub fn open(path: impl AsRef<Path>, registry: &Registry, progress: &dyn Progress) -> Result<Self, SceneError> {
+        Self::open_with(path, None, registry, progress)
+    }
+
+    /// As [`open`](Self::open), with a folder for paths that begin with
+    /// [`$VOLACT_DATA`](super::DATA_PREFIX).
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    pub fn open_with(
+        path: impl AsRef<Path>,
+        data: Option<&Path>,
+        registry: &Registry,
+        progress: &dyn Progress,
+    ) -> Result<Self, SceneError> {
         let path = path.as_ref();
-        let base = path.parent().unwrap_or(Path::new(""));
+        let folders = Folders { base: path.parent().unwrap_or(Path::new("")), data };
         let named = |problems: Problems| problems.of_file(path.display().to_string());
-        Ok(SceneFile::open(path, registry)?.build(registry, base, progress).map_err(named)?)
+        Ok(SceneFile::open(path, registry)?.build(registry, folders, progress).map_err(named)?)
     }
 }
 
@@ -114,7 +132,7 @@ pub(crate) fn read_text(path: &Path) -> Result<String, SceneError> {
 }
 
 /// An error with all its causes in one line.
-fn chain(error: &dyn Error) -> String {
+pub(super) fn chain(error: &dyn Error) -> String {
     let mut text = error.to_string();
     let mut source = error.source();
     while let Some(cause) = source {
@@ -124,7 +142,7 @@ fn chain(error: &dyn Error) -> String {
     text
 }
 
-fn plain(options: &BTreeMap<String, ParameterSpec>) -> Options {
+pub(super) fn plain(options: &BTreeMap<String, ParameterSpec>) -> Options {
     let plain = |(name, value): (&String, &ParameterSpec)| match value {
         ParameterSpec::Value(value) => Some((name.clone(), value.clone())),
         _ => None,
@@ -132,63 +150,20 @@ fn plain(options: &BTreeMap<String, ParameterSpec>) -> Options {
     options.iter().filter_map(plain).collect()
 }
 
-struct Build<'a> {
-    scene: &'a SceneFile,
-    registry: &'a Registry,
-    base: &'a Path,
-    data: BTreeMap<&'a str, Volume>,
-    problems: Vec<Problem>,
+/// A scene on its way from the description.
+pub(super) struct Build<'a> {
+    pub scene: &'a SceneFile,
+    pub registry: &'a Registry,
+    pub folders: Folders<'a>,
+    /// What was loaded, by name.
+    pub data: BTreeMap<&'a str, Data>,
+    pub problems: Vec<Problem>,
 }
 
 impl<'a> Build<'a> {
-    fn refuse<T>(&mut self, path: &str, found: impl Into<String>, wanted: impl Into<String>) -> Option<T> {
+    pub fn refuse<T>(&mut self, path: &str, found: impl Into<String>, wanted: impl Into<String>) -> Option<T> {
         self.problems.push(self.scene.problem(path, found, wanted));
         None
-    }
-
-    /// Reads every file that a shape uses, once.
-    fn load(&mut self, progress: &dyn Progress) {
-        let mut read: Vec<(&DataSpec, Volume)> = Vec::new();
-        let scene = self.scene;
-        let used = |name: &str| scene.shapes.iter().any(|shape| shape.uses(name));
-        for (name, spec) in scene.data.iter().filter(|(name, _)| used(name)) {
-            let same = |s: &DataSpec| s.file == spec.file && s.loader == spec.loader && s.options == spec.options;
-            let volume = match read.iter().find(|(s, _)| same(s)) {
-                Some((_, volume)) => Some(volume.clone()),
-                None => self.read(name, spec, progress),
-            };
-            let Some(volume) = volume else { continue };
-            read.push((spec, volume.clone()));
-            if let Some(volume) = self.adjust(name, spec, volume) {
-                self.data.insert(name, volume);
-            }
-        }
-    }
-
-    fn read(&mut self, name: &str, spec: &DataSpec, progress: &dyn Progress) -> Option<Volume> {
-        let path = self.base.join(&spec.file);
-        let options = plain(&spec.options);
-        match self.registry.load_with(&path, spec.loader.as_deref(), &options, progress) {
-            Ok(volume) => Some(volume),
-            Err(error) => self.refuse(&format!("data.{name}.file"), chain(&error), "a volume"),
-        }
-    }
-
-    /// The volume with what the description changes about it; the voxels are shared.
-    fn adjust(&mut self, name: &str, spec: &DataSpec, volume: Volume) -> Option<Volume> {
-        let mut desc = volume.desc().clone();
-        desc.spacing = spec.spacing.unwrap_or(desc.spacing);
-        desc.placement = spec.placement.as_deref().map_or(desc.placement, |steps| compose(steps, desc.placement));
-        desc.slope = spec.slope.unwrap_or(desc.slope);
-        desc.intercept = spec.intercept.unwrap_or(desc.intercept);
-        desc.unit = spec.unit.clone().unwrap_or(desc.unit);
-        if desc == *volume.desc() {
-            return Some(volume);
-        }
-        match Volume::new(desc, volume.data().clone()) {
-            Ok(volume) => Some(volume),
-            Err(error) => self.refuse(&format!("data.{name}"), chain(&error), "changes that make a volume"),
-        }
     }
 
     fn shape(&mut self, index: usize, spec: &ShapeSpec) -> Option<Shape> {
@@ -207,15 +182,34 @@ impl<'a> Build<'a> {
         if spec.volume().is_some() && volume.is_none() {
             return None;
         }
-        let geometry = self.geometry(&path, &spec.geometry, volume.as_ref())?;
+        let geometry = self.geometry(&path, spec, volume.as_ref())?;
+        self.attributes_fit(&path, geometry.as_ref(), &parameters)?;
         let placement = volume.map_or(DAffine3::IDENTITY, |v| v.volume().desc().placement);
         let transform = spec.transform.as_deref().map_or(placement, |steps| compose(steps, placement));
         let appearance = Appearance { shader: spec.shader.clone(), parameters };
-        Some(Shape::build(self.scene.shape_name(index), geometry, appearance, transform))
+        let shape = Shape::build(self.scene.shape_name(index), geometry, appearance, transform);
+        shape.set_clip(spec.clip.clone());
+        Some(shape)
+    }
+
+    /// Per-vertex numbers must be as many as the geometry's vertices, where it knows them.
+    fn attributes_fit(&mut self, path: &str, geometry: &dyn Geometry, parameters: &ParameterMap) -> Option<()> {
+        let Some(vertices) = geometry.vertex_count() else { return Some(()) };
+        let mut good = Some(());
+        for (name, value) in parameters {
+            if let ParameterValue::Attribute(attribute) = value
+                && attribute.len() != vertices
+            {
+                let found = format!("attribute {:?} of {} vertices", attribute.name, attribute.len());
+                let wanted = format!("one of {vertices}, the vertices of the shape's geometry");
+                good = self.refuse(&format!("{path}.parameters.{name}"), found, wanted);
+            }
+        }
+        good
     }
 
     /// All values that can be made; those that cannot are problems.
-    fn parameters(
+    pub fn parameters(
         &mut self,
         path: &str,
         specs: &BTreeMap<String, ParameterSpec>,
@@ -226,7 +220,8 @@ impl<'a> Build<'a> {
             let path = format!("{path}.{name}");
             let value = match spec {
                 ParameterSpec::Volume(volume) => self.texture(&path, volume).map(ParameterValue::Volume),
-                other => match other.to_value(declared(name).as_ref(), self.base) {
+                ParameterSpec::DataAttribute(spec) => self.attribute(&path, spec).map(ParameterValue::Attribute),
+                other => match other.to_value(declared(name).as_ref(), self.folders) {
                     Ok(value) => Some(value),
                     Err(problem) => self.refuse(&path, problem.found, problem.wanted),
                 },
@@ -236,54 +231,33 @@ impl<'a> Build<'a> {
         made
     }
 
-    fn texture(&mut self, path: &str, spec: &VolumeSpec) -> Option<VolumeTexture> {
-        // Data that could not be read is a problem already.
-        let volume = self.data.get(spec.data.as_str())?.clone();
-        let mut texture = VolumeTexture::new(&volume).with_filter(spec.filter);
-        if spec.luminance {
-            texture = texture.as_luminance();
+    /// Opaque pictures of that many pixels.
+    fn opaque(&mut self, spec: &OpaqueSpec, count: usize) -> Option<Opaque> {
+        if count > MAX_PIXELS {
+            return None;
         }
-        if let Some(roi) = spec.data_roi {
-            let Ok(cut) = texture.with_data_roi(roi) else {
-                let wanted = format!("a part of {:?} samples", volume.dims());
-                return self.refuse(&format!("{path}.data_roi"), format!("{:?} to {:?}", roi.min, roi.max), wanted);
-            };
-            texture = cut;
-        }
-        let ranged = spec.range.map_or(Ok(texture.clone()), |range| texture.with_range(range));
-        match ranged.and_then(|t| spec.geometry_roi.map_or(Ok(t.clone()), |roi| t.with_geometry_roi(roi))) {
-            Ok(texture) => Some(texture),
-            Err(error) => self.refuse(path, chain(&error), "a volume texture"),
-        }
-    }
-
-    fn geometry(
-        &mut self,
-        path: &str,
-        spec: &GeometrySpec,
-        volume: Option<&VolumeTexture>,
-    ) -> Option<Arc<dyn Geometry>> {
-        let path = format!("{path}.geometry");
-        let made = match spec {
-            GeometrySpec::Around => {
-                let roi = volume.map(VolumeTexture::geometry_roi);
-                return roi.map(|roi| Arc::new(Block::from(roi)) as Arc<dyn Geometry>);
-            }
-            GeometrySpec::Block { offset, dimensions } => {
-                Block::new(*offset, *dimensions).map(|block| Arc::new(block) as Arc<dyn Geometry>)
-            }
-            GeometrySpec::Named { name, parameters } => {
-                let declarations = self.registry.declarations();
-                let declaration = declarations.into_iter().find(|d| d.name == *name).cloned();
-                let declared = |name: &str| declaration.as_ref()?.parameter(name).cloned();
-                let parameters = self.parameters(&format!("{path}.parameters"), parameters, declared);
-                self.registry.geometry(name, &parameters)
+        let folders = self.folders;
+        let mut read = |path: &str, file: &Path, numbers: usize| match pixels(folders, file, numbers * count) {
+            Ok(numbers) => Some(numbers),
+            Err((found, wanted)) => self.refuse(path, found, wanted),
+        };
+        let color = spec.color.as_ref().map(|file| read("opaque.color", file, 4));
+        let (values, depth) = match &spec.depth {
+            OpaqueDepthSpec::Distance(file) => (read("opaque.depth", file, 1), None),
+            OpaqueDepthSpec::Buffer { file, range, world_to_clip } => {
+                (read("opaque.depth_buffer.file", file, 1), Some((*range, *world_to_clip)))
             }
         };
-        match made {
-            Ok(geometry) => Some(geometry),
-            Err(error) => self.refuse(&path, chain(&error), "a geometry"),
-        }
+        let color = color.map_or(Some(None), |numbers| numbers.map(Some))?;
+        let values = values?.into();
+        let pixel = |p: &[f32]| [p[0], p[1], p[2], p[3]];
+        Some(Opaque {
+            color: color.map(|numbers| numbers.chunks_exact(4).map(pixel).collect()),
+            depth: match depth {
+                None => OpaqueDepth::Distance(values),
+                Some((range, world_to_clip)) => OpaqueDepth::Buffer { values, range, world_to_clip },
+            },
+        })
     }
 
     fn frame(&mut self, shapes: &[Shape]) -> FrameDesc {
@@ -297,6 +271,10 @@ impl<'a> Build<'a> {
         (frame.width, frame.height, frame.viewport) = (width, height, image.viewport);
         frame.background = image.background.unwrap_or(frame.background);
         frame.depth_threshold = image.depth_threshold.unwrap_or(frame.depth_threshold);
+        frame.clip = self.scene.clip.clone();
+        if let Some(spec) = &self.scene.opaque {
+            frame.opaque = self.opaque(spec, width.saturating_mul(height));
+        }
         if let Err(error) = frame.validate() {
             self.refuse::<()>("image", chain(&error), "a picture that can be drawn");
         }
@@ -304,8 +282,18 @@ impl<'a> Build<'a> {
     }
 }
 
+/// Numbers of a file, four bytes each.
+fn pixels(folders: Folders, file: &Path, count: usize) -> Result<Vec<f32>, values::Fault> {
+    let bytes = values::read(&folders.path(file)?, 4)?;
+    if bytes.len() == 4 * count {
+        return Ok(values::numbers(&bytes));
+    }
+    let found = format!("{}: {} numbers", file.display(), bytes.len() / 4);
+    Err((found, format!("{count} of little-endian f32, for the pixels of the picture")))
+}
+
 /// All steps in order, as one map.
-fn compose(steps: &[TransformStep], placement: DAffine3) -> DAffine3 {
+pub(super) fn compose(steps: &[TransformStep], placement: DAffine3) -> DAffine3 {
     let one = |step: &TransformStep| match *step {
         TransformStep::Placement => placement,
         TransformStep::Matrix(matrix) => matrix,
@@ -316,16 +304,4 @@ fn compose(steps: &[TransformStep], placement: DAffine3) -> DAffine3 {
         TransformStep::Scale(factors) => DAffine3::from_scale(factors),
     };
     steps.iter().fold(DAffine3::IDENTITY, |so_far, step| one(step) * so_far)
-}
-
-impl ShapeSpec {
-    /// Whether a parameter of the shape or its geometry reads that data.
-    fn uses(&self, data: &str) -> bool {
-        let of_geometry = match &self.geometry {
-            GeometrySpec::Named { parameters, .. } => Some(parameters),
-            _ => None,
-        };
-        let values = self.parameters.values().chain(of_geometry.into_iter().flat_map(|p| p.values()));
-        values.into_iter().any(|value| matches!(value, ParameterSpec::Volume(volume) if volume.data == data))
-    }
 }

@@ -13,9 +13,15 @@ pub(super) fn references(scene: &SceneFile) -> Vec<Problem> {
     let mut problems = Vec::new();
     for (i, shape) in scene.shapes.iter().enumerate() {
         let path = format!("shapes[{i}]");
-        volumes_exist(scene, &format!("{path}.parameters"), &shape.parameters, &mut problems);
-        if let GeometrySpec::Named { parameters, .. } = &shape.geometry {
-            volumes_exist(scene, &format!("{path}.geometry.parameters"), parameters, &mut problems);
+        values_exist(scene, &format!("{path}.parameters"), &shape.parameters, &mut problems);
+        match &shape.geometry {
+            GeometrySpec::Named { parameters, .. } => {
+                values_exist(scene, &format!("{path}.geometry.parameters"), parameters, &mut problems);
+            }
+            GeometrySpec::Data { data, .. } => {
+                data_exists(scene, &format!("{path}.geometry.data"), data, &mut problems);
+            }
+            _ => {}
         }
         let unread = scene.place(&format!("{path}.parameters.volume")).is_some() || shape.shader.is_empty();
         if shape.volume().is_none() && !unread {
@@ -25,25 +31,29 @@ pub(super) fn references(scene: &SceneFile) -> Vec<Problem> {
     problems
 }
 
-fn volumes_exist(
+fn values_exist(
     scene: &SceneFile,
     path: &str,
     parameters: &BTreeMap<String, ParameterSpec>,
     problems: &mut Vec<Problem>,
 ) {
     for (name, value) in parameters {
-        let ParameterSpec::Volume(volume) = value else { continue };
-        if volume.data.is_empty() || scene.data.contains_key(&volume.data) {
-            continue;
+        if let Some(data) = value.data().filter(|data| !data.is_empty()) {
+            data_exists(scene, &format!("{path}.{name}.data"), data, problems);
         }
-        let known: Vec<_> = scene.data.keys().map(String::as_str).collect();
-        let wanted = match known.is_empty() {
-            true => "an entry under `data`, which has none".to_owned(),
-            false => format!("a name under `data`: {}", known.join(", ")),
-        };
-        let problem = scene.problem(&format!("{path}.{name}.data"), format!("{:?}", volume.data), wanted);
-        problems.push(problem.near(&volume.data, known));
     }
+}
+
+fn data_exists(scene: &SceneFile, path: &str, name: &str, problems: &mut Vec<Problem>) {
+    if scene.data.contains_key(name) {
+        return;
+    }
+    let known: Vec<_> = scene.data.keys().map(String::as_str).collect();
+    let wanted = match known.is_empty() {
+        true => "an entry under `data`, which has none".to_owned(),
+        false => format!("a name under `data`: {}", known.join(", ")),
+    };
+    problems.push(scene.problem(path, format!("{name:?}"), wanted).near(name, known));
 }
 
 /// A shape without a volume has nothing to be around, and no place of a volume's.
@@ -52,7 +62,8 @@ fn needs_volume(scene: &SceneFile, path: &str, shape: &ShapeSpec, problems: &mut
         let inner = format!("{path}.{field}");
         if scene.place(&inner).is_some() { inner } else { path.to_owned() }
     };
-    if shape.geometry == GeometrySpec::Around {
+    let of_mesh = shape.attribute_data().is_some() || scene.place(&format!("{path}.parameters.scalars")).is_some();
+    if shape.geometry == GeometrySpec::Around && !of_mesh {
         let wanted = "a parameter with a volume, or a `geometry`";
         problems.push(scene.problem(&at("geometry"), "a shape without a volume", wanted));
     }
@@ -196,7 +207,7 @@ fn fits(value: &ParameterSpec, decl: &ParameterDecl) -> Result<(), (String, Stri
         }
         ParameterSpec::Volume(_) => ParameterType::Volume,
         ParameterSpec::Table(_) => ParameterType::Table,
-        ParameterSpec::Attribute(_) => ParameterType::Attribute,
+        ParameterSpec::Attribute(_) | ParameterSpec::DataAttribute(_) => ParameterType::Attribute,
     };
     if decl.types.contains(&kind) { Ok(()) } else { Err((format!("a {kind}"), types(decl))) }
 }

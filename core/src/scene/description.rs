@@ -2,14 +2,18 @@
 
 use std::{collections::BTreeMap, path::PathBuf};
 
-use glam::{DAffine3, DVec3};
+use glam::{DAffine3, DMat4, DVec3};
 
-use crate::{Aabb, Camera, ControlPoint, Filter, ParameterValue, Roi, ScalarType, View, Viewport};
+use crate::{
+    Aabb, Camera, Clip, ControlPoint, Filter, ParameterValue, Roi, ScalarType, Slices, View, Viewport,
+    camera::DepthRange,
+};
 
-/// A volume to read from a file, and what to change about it.
+/// A file to read: a volume, a mesh or a surface, as its loader says. What is changed about it
+/// (`spacing` and below) is for volumes only.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DataSpec {
-    /// The file or the directory of a series, relative to the scene file.
+    /// The file or the directory of a series; see [`Folders`](super::Folders).
     pub file: PathBuf,
     /// The loader; chosen by content where `None`.
     pub loader: Option<String>,
@@ -41,12 +45,17 @@ pub struct ShapeSpec {
     /// From object to world space, step by step; where `None`, the place of the shape's volume,
     /// or the world's origin where there is none.
     pub transform: Option<Vec<TransformStep>>,
+    /// The planes on which it is drawn, in object space.
+    pub slices: Option<Slices>,
+    /// What cuts it, in object space.
+    pub clip: Clip,
 }
 
 /// A geometry.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum GeometrySpec {
-    /// The block that the shape's volume fills.
+    /// The block that the shape's volume fills; in a shape without a volume, the mesh to whose
+    /// vertices its attribute belongs.
     #[default]
     Around,
     /// A block.
@@ -63,6 +72,76 @@ pub enum GeometrySpec {
         /// Its parameters.
         parameters: BTreeMap<String, ParameterSpec>,
     },
+    /// The mesh or surface of a file.
+    Data {
+        /// The name of the data.
+        data: String,
+        /// The attribute that holds its texture coordinates, if it shall have any.
+        texture_coordinates: Option<String>,
+    },
+    /// An unstructured mesh.
+    Mesh(MeshSpec),
+    /// A grid of hexahedra.
+    StructuredMesh {
+        /// Vertices along each axis.
+        dims: [usize; 3],
+        /// The vertices, x fastest.
+        points: PointsSpec,
+        /// Their texture coordinates.
+        texture_coordinates: Option<PointsSpec>,
+    },
+    /// Opaque triangles.
+    Surface {
+        /// The vertices.
+        points: PointsSpec,
+        /// Three vertices each.
+        triangles: Vec<[u32; 3]>,
+    },
+    /// A ball.
+    Sphere {
+        /// Its centre.
+        center: DVec3,
+        /// Its radius.
+        radius: f64,
+        /// Flat faces around its axis.
+        segments: u32,
+    },
+    /// A cylinder.
+    Cylinder {
+        /// The ends of its axis.
+        ends: [DVec3; 2],
+        /// Its radius.
+        radius: f64,
+        /// Flat faces around its axis.
+        segments: u32,
+    },
+}
+
+/// An unstructured mesh that is written out: cells by type, corners in the order of
+/// [`CellType`](crate::CellType).
+#[derive(Clone, Debug, PartialEq)]
+pub struct MeshSpec {
+    /// The vertices.
+    pub points: PointsSpec,
+    /// Their texture coordinates.
+    pub texture_coordinates: Option<PointsSpec>,
+    /// Cells of four corners.
+    pub tetrahedra: Vec<[u32; 4]>,
+    /// Cells of eight corners.
+    pub hexahedra: Vec<[u32; 8]>,
+    /// Cells of six corners.
+    pub wedges: Vec<[u32; 6]>,
+    /// Cells of five corners.
+    pub pyramids: Vec<[u32; 5]>,
+}
+
+/// Positions, written out or from a file.
+#[derive(Clone, Debug, PartialEq)]
+pub enum PointsSpec {
+    /// Written out.
+    Inline(Vec<DVec3>),
+    /// A file of little-endian `f32`, three a point.
+    File(PathBuf),
 }
 
 /// One step of a transform.
@@ -94,8 +173,10 @@ pub enum ParameterSpec {
     Volume(VolumeSpec),
     /// A lookup table.
     Table(TableSpec),
-    /// Per-vertex numbers.
+    /// Per-vertex numbers of the scene's own.
     Attribute(AttributeSpec),
+    /// Per-vertex numbers of a mesh's file.
+    DataAttribute(DataAttributeSpec),
 }
 
 /// A volume texture.
@@ -138,7 +219,7 @@ pub enum TableEntries {
     },
     /// Equidistant entries from a file: four little-endian `f32` each.
     File {
-        /// The file, relative to the scene file.
+        /// The file.
         file: PathBuf,
         /// The values of the first and the last; the texture's range where `None`.
         domain: Option<[f64; 2]>,
@@ -167,12 +248,23 @@ pub struct AttributeSpec {
     pub values: AttributeValues,
 }
 
+/// Per-vertex numbers of a mesh's file.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct DataAttributeSpec {
+    /// The name of the data.
+    pub data: String,
+    /// The attribute's name in the file.
+    pub name: String,
+    /// The one component to take out; all of them where `None`.
+    pub component: Option<usize>,
+}
+
 /// Where per-vertex numbers come from.
 #[derive(Clone, Debug, PartialEq)]
 pub enum AttributeValues {
     /// Written out.
     Inline(Vec<f64>),
-    /// A file of little-endian numbers, relative to the scene file.
+    /// A file of little-endian numbers.
     File(PathBuf),
 }
 
@@ -212,4 +304,30 @@ pub struct ActionSpec {
     pub name: String,
     /// Its options.
     pub options: BTreeMap<String, ParameterSpec>,
+}
+
+/// Opaque pictures that lie in the scene: what [`Opaque`](crate::Opaque) is made of. Files hold
+/// little-endian `f32`, row by row from the top, for as many pixels as the picture has.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OpaqueSpec {
+    /// A file of premultiplied red, green, blue and opacity.
+    pub color: Option<PathBuf>,
+    /// How far away it is.
+    pub depth: OpaqueDepthSpec,
+}
+
+/// How far away opaque things are.
+#[derive(Clone, Debug, PartialEq)]
+pub enum OpaqueDepthSpec {
+    /// A file of world distances.
+    Distance(PathBuf),
+    /// A file of a depth buffer.
+    Buffer {
+        /// The file.
+        file: PathBuf,
+        /// What near and far map to.
+        range: DepthRange,
+        /// World to clip space, as it was drawn with.
+        world_to_clip: DMat4,
+    },
 }

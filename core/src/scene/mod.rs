@@ -27,14 +27,20 @@
 //! ```
 //!
 //! Nothing in a file can run, and a file that is huge, deeply nested or otherwise hostile ends in
-//! an error. Data paths are relative to the scene file; absolute paths and `..` are allowed, since
-//! data is no code. What is read from them is only ever read as a volume, a table or an attribute.
+//! an error. Data paths are relative to the scene file, or to a folder of data that whoever opens
+//! the scene names ([`Folders`]); absolute paths and `..` are allowed, since data is no code. What
+//! is read from them is only ever read as a volume, a mesh, a table, numbers or a picture.
 
 mod build;
 mod check;
+mod cuts;
+mod data;
 mod description;
 mod document;
+mod folders;
+mod geometry;
 mod lexer;
+mod meshes;
 mod parameters;
 mod problem;
 mod read;
@@ -44,14 +50,16 @@ mod view;
 
 use std::collections::BTreeMap;
 
-use crate::Registry;
+use crate::{Clip, Registry};
 
 pub use build::{Scene, SceneError};
 pub use description::{
-    ActionSpec, AttributeSpec, AttributeValues, CameraSpec, DataSpec, GeometrySpec, ImageSpec, ParameterSpec,
-    ShapeSpec, TableEntries, TableSpec, TransformStep, VolumeSpec,
+    ActionSpec, AttributeSpec, AttributeValues, CameraSpec, DataAttributeSpec, DataSpec, GeometrySpec, ImageSpec,
+    MeshSpec, OpaqueDepthSpec, OpaqueSpec, ParameterSpec, PointsSpec, ShapeSpec, TableEntries, TableSpec,
+    TransformStep, VolumeSpec,
 };
 pub use document::{MAX_BYTES, MAX_DEPTH, MAX_NODES};
+pub use folders::{DATA_PREFIX, Folders};
 pub use problem::{Problem, Problems, Spot};
 pub use reader::MAX_NAME;
 
@@ -70,6 +78,10 @@ pub struct SceneFile {
     pub data: BTreeMap<String, DataSpec>,
     /// What to draw, in this order.
     pub shapes: Vec<ShapeSpec>,
+    /// What cuts all shapes, in world space.
+    pub clip: Clip,
+    /// Opaque pictures among which the shapes lie.
+    pub opaque: Option<OpaqueSpec>,
     /// From where; whoever draws chooses where `None`, and nobody else does: from the front.
     pub camera: Option<CameraSpec>,
     /// Into what.

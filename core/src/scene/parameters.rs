@@ -5,9 +5,9 @@ use std::{collections::BTreeMap, path::PathBuf};
 use glam::{DMat4, DVec2, DVec3, DVec4};
 
 use super::{
-    AttributeSpec, AttributeValues, ParameterSpec, TableEntries, TableSpec, VolumeSpec,
+    AttributeSpec, AttributeValues, DataAttributeSpec, ParameterSpec, TableEntries, TableSpec, VolumeSpec,
     document::Kind,
-    reader::{At, Reader},
+    reader::{At, Fields, Reader},
 };
 use crate::{Aabb, ControlPoint, Filter, ParameterValue, Roi, ScalarType};
 
@@ -30,7 +30,7 @@ pub(super) fn parameter(reader: &mut Reader, at: &At) -> Option<ParameterSpec> {
     match head(at) {
         "Volume" => volume(reader, at).map(ParameterSpec::Volume),
         "Table" | "Entries" | "WindowLevel" => table(reader, at).map(ParameterSpec::Table),
-        "Attribute" => attribute(reader, at).map(ParameterSpec::Attribute),
+        "Attribute" => attribute(reader, at),
         _ => value(reader, at).map(ParameterSpec::Value),
     }
 }
@@ -241,18 +241,39 @@ pub(super) fn rgba(reader: &mut Reader, at: &At, wanted: &str) -> Option<[f32; 4
     reader.array(at, wanted, channel).map(|c| c.map(|v| v as f32))
 }
 
-fn attribute(reader: &mut Reader, at: &At) -> Option<AttributeSpec> {
-    let fields = reader.fields(at, &["Attribute"], &["name", "components", "scalar", "values", "file"])?;
-    let name = reader.required(&fields, "name", "the attribute's name");
+/// Numbers of a mesh's file, where `data` names one, else the scene's own.
+fn attribute(reader: &mut Reader, at: &At) -> Option<ParameterSpec> {
+    let known = ["data", "name", "component", "components", "scalar", "values", "file"];
+    let fields = reader.fields(at, &["Attribute"], &known)?;
+    let name = reader.required(&fields, "name", "the attribute's name").and_then(|at| reader.name(&at));
+    let own = ["components", "scalar", "values", "file"];
+    if let Some(data) = fields.optional("data") {
+        let data = reader.name(&data);
+        let component = fields.optional("component").map_or(Some(None), |at| reader.count(&at, 0).map(Some));
+        if let Some(at) = own.iter().find_map(|name| fields.optional(name)) {
+            return reader.refuse(&at, "nothing: `data` gives the numbers");
+        }
+        return Some(ParameterSpec::DataAttribute(DataAttributeSpec {
+            data: data?,
+            name: name?,
+            component: component?,
+        }));
+    }
+    if let Some(at) = fields.optional("component") {
+        return reader.refuse(&at, "nothing: `component` picks from the numbers of `data`");
+    }
+    own_attribute(reader, &fields, name).map(ParameterSpec::Attribute)
+}
+
+fn own_attribute(reader: &mut Reader, fields: &Fields, name: Option<String>) -> Option<AttributeSpec> {
     let scalars = ScalarType::ALL.map(|t| (t.name(), t));
-    let name = name.and_then(|at| reader.name(&at));
     let components = fields.optional("components").map_or(Some(1), |at| reader.count(&at, 1));
     let scalar = fields.optional("scalar").map_or(Some(ScalarType::F32), |at| reader.word(&at, &scalars));
     let values = match fields.optional("file") {
         Some(file) => reader.text(&file).map(|file| AttributeValues::File(file.into())),
         None => {
-            let wanted = "numbers, vertex by vertex, or a `file` of them";
-            let list = reader.required(&fields, "values", wanted);
+            let wanted = "numbers, vertex by vertex, or a `file` of them, or the name of `data` that has them";
+            let list = reader.required(fields, "values", wanted);
             let items = list.and_then(|at| reader.list(&at, wanted));
             let read: Option<Vec<_>> = items.map(|items| items.iter().map(|at| reader.float(at)).collect());
             read.and_then(|read| read.into_iter().collect()).map(AttributeValues::Inline)

@@ -5,8 +5,10 @@ use std::collections::BTreeSet;
 use glam::{DAffine3, DVec3};
 
 use super::{
-    ActionSpec, DataSpec, GeometrySpec, Places, Problems, SCENE_VERSION, SceneFile, ShapeSpec, TransformStep, check,
+    ActionSpec, DataSpec, Places, Problems, SCENE_VERSION, SceneFile, ShapeSpec, TransformStep, check,
+    cuts::{clip, opaque, slices},
     document::{self, Kind},
+    geometry::geometry,
     parameters::{head, matrix, parameters, plain_parameters},
     reader::{At, Reader},
     view::{camera, image},
@@ -28,7 +30,7 @@ pub(super) fn parse(text: &str, registry: Option<&Registry>) -> Result<SceneFile
 }
 
 fn scene(reader: &mut Reader, at: &At) -> Option<SceneFile> {
-    let known = ["version", "data", "shapes", "camera", "image", "action"];
+    let known = ["version", "data", "shapes", "clip", "opaque", "camera", "image", "action"];
     let fields = reader.fields(at, &["Scene"], &known)?;
     reader.version(&fields, SCENE_VERSION);
     let mut scene = SceneFile::default();
@@ -43,6 +45,8 @@ fn scene(reader: &mut Reader, at: &At) -> Option<SceneFile> {
         scene.shapes = shapes.iter().map(|at| shape(reader, at).unwrap_or_default()).collect();
         unique_names(reader, &shapes, &scene);
     }
+    scene.clip = fields.optional("clip").and_then(|at| clip(reader, &at)).unwrap_or_default();
+    scene.opaque = fields.optional("opaque").and_then(|at| opaque(reader, &at));
     scene.camera = fields.optional("camera").and_then(|at| camera(reader, &at));
     scene.image = fields.optional("image").and_then(|at| image(reader, &at)).unwrap_or_default();
     scene.action = fields.optional("action").and_then(|at| action(reader, &at));
@@ -82,7 +86,8 @@ fn data(reader: &mut Reader, at: &At) -> Option<DataSpec> {
 }
 
 fn shape(reader: &mut Reader, at: &At) -> Option<ShapeSpec> {
-    let fields = reader.fields(at, &["Shape"], &["name", "geometry", "shader", "parameters", "transform"])?;
+    let known = ["name", "geometry", "shader", "parameters", "transform", "slices", "clip"];
+    let fields = reader.fields(at, &["Shape"], &known)?;
     let shader = reader.required(&fields, "shader", "a shader's name");
     Some(ShapeSpec {
         name: fields.optional("name").and_then(|at| reader.name(&at)),
@@ -90,34 +95,9 @@ fn shape(reader: &mut Reader, at: &At) -> Option<ShapeSpec> {
         shader: shader.and_then(|at| reader.name(&at)).unwrap_or_default(),
         parameters: fields.optional("parameters").map(|at| parameters(reader, &at)).unwrap_or_default(),
         transform: fields.optional("transform").and_then(|at| transform(reader, &at)),
+        slices: fields.optional("slices").and_then(|at| slices(reader, &at)),
+        clip: fields.optional("clip").and_then(|at| clip(reader, &at)).unwrap_or_default(),
     })
-}
-
-fn geometry(reader: &mut Reader, at: &At) -> Option<GeometrySpec> {
-    match head(at) {
-        "Around" if matches!(&at.node.kind, Kind::Tuple { items, .. } if items.is_empty()) => {
-            Some(GeometrySpec::Around)
-        }
-        "Block" => {
-            let fields = reader.fields(at, &["Block"], &["offset", "dimensions"])?;
-            let offset = reader.required(&fields, "offset", "the lowest corner (x, y, z)");
-            let dimensions = reader.required(&fields, "dimensions", "the lengths (x, y, z)");
-            let positive = |r: &mut Reader, at: &At| r.float_where(at, |v| v > 0.0, "a positive, finite number");
-            let offset = offset.and_then(|at| reader.vec3(&at));
-            let dimensions = dimensions.and_then(|at| reader.array(&at, "three numbers (x, y, z)", positive));
-            Some(GeometrySpec::Block { offset: offset?, dimensions: DVec3::from_array(dimensions?) })
-        }
-        "Geometry" => {
-            let fields = reader.fields(at, &["Geometry"], &["name", "parameters"])?;
-            let name = reader.required(&fields, "name", "a geometry's name").and_then(|at| reader.name(&at));
-            let parameters = fields.optional("parameters").map(|at| parameters(reader, &at)).unwrap_or_default();
-            Some(GeometrySpec::Named { name: name?, parameters })
-        }
-        other => {
-            let known = ["Around", "Block", "Geometry"];
-            reader.unknown(at, other, "one of ", &known)
-        }
-    }
 }
 
 /// One step or a list of steps, applied in order.

@@ -3,8 +3,8 @@
 use std::{fs, io::Read, path::Path};
 
 use super::{
-    AttributeSpec, AttributeValues, ParameterSpec, Problem, Problems, TableEntries, TableSpec, check, document,
-    parameters, reader::Reader,
+    AttributeSpec, AttributeValues, Folders, ParameterSpec, Problem, Problems, TableEntries, TableSpec, check,
+    document, parameters, reader::Reader,
 };
 use crate::{Attribute, Buffer, LookupTable, ParameterDecl, ParameterValue, ScalarType};
 
@@ -12,7 +12,7 @@ use crate::{Attribute, Buffer, LookupTable, ParameterDecl, ParameterValue, Scala
 const MAX_FILE: u64 = 1 << 30;
 
 /// What was found, and what was wanted.
-type Fault = (String, String);
+pub(super) type Fault = (String, String);
 
 impl ParameterSpec {
     /// Reads one value as a scene writes it.
@@ -20,7 +20,7 @@ impl ParameterSpec {
     /// ```
     /// use volact_core::{ParameterValue, scene::ParameterSpec};
     ///
-    /// let value = ParameterSpec::parse("(1, 0, 0)")?.to_value(None, "".as_ref())?;
+    /// let value = ParameterSpec::parse("(1, 0, 0)")?.to_value(None, std::path::Path::new(""))?;
     /// assert_eq!(value, ParameterValue::Vec3(volact_core::glam::DVec3::X));
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
@@ -36,33 +36,38 @@ impl ParameterSpec {
         value.ok_or_else(|| Problems::new(vec![Problem::new(None, "", "nothing", "a value")]))
     }
 
-    /// Makes the value; files are relative to `base`. Where `declared` wants a colour, three or
-    /// four numbers are one.
+    /// Makes the value. Where `declared` wants a colour, three or four numbers are one.
     ///
     /// # Errors
-    /// If a table or an attribute cannot be made, or the value is a volume, which needs a scene.
-    pub fn to_value(&self, declared: Option<&ParameterDecl>, base: &Path) -> Result<ParameterValue, Problem> {
+    /// If a table or an attribute cannot be made, or the value is a volume or an attribute of the
+    /// scene's data, which needs a scene.
+    pub fn to_value<'a>(
+        &self,
+        declared: Option<&ParameterDecl>,
+        folders: impl Into<Folders<'a>>,
+    ) -> Result<ParameterValue, Problem> {
+        let folders = folders.into();
+        let wanted = || "a value that needs no data of a scene".to_owned();
         let made = match self {
             Self::Value(value) => Ok(declared.map_or(value.clone(), |decl| check::coerce(value, decl))),
-            Self::Table(spec) => table(spec, base).map(ParameterValue::Table),
-            Self::Attribute(spec) => attribute(spec, base).map(ParameterValue::Attribute),
-            Self::Volume(_) => Err(("a volume".into(), "a value that needs no data of a scene".into())),
+            Self::Table(spec) => table(spec, folders).map(ParameterValue::Table),
+            Self::Attribute(spec) => attribute(spec, folders).map(ParameterValue::Attribute),
+            Self::Volume(_) => Err(("a volume".into(), wanted())),
+            Self::DataAttribute(_) => Err(("an attribute of the scene's data".into(), wanted())),
         };
         made.map_err(|(found, wanted)| Problem::new(None, "", found, wanted))
     }
 }
 
 /// A lookup table.
-fn table(spec: &TableSpec, base: &Path) -> Result<LookupTable, Fault> {
+fn table(spec: &TableSpec, folders: Folders) -> Result<LookupTable, Fault> {
     let fault = |error: crate::table::TableError| (error.to_string(), "a lookup table".to_owned());
     let table = match &spec.entries {
         TableEntries::Points(points) => LookupTable::from_points(points.clone()),
         TableEntries::Entries { values, domain } => LookupTable::from_entries(values.clone(), *domain),
         TableEntries::File { file, domain } => {
-            let bytes = read(&base.join(file), 16)?;
-            let number = |b: &[u8]| f32::from_le_bytes([b[0], b[1], b[2], b[3]]);
-            let numbers: Vec<f32> = bytes.chunks_exact(4).map(number).collect();
-            LookupTable::from_entries(numbers, *domain)
+            let bytes = read(&folders.path(file)?, 16)?;
+            LookupTable::from_entries(numbers(&bytes), *domain)
         }
         TableEntries::WindowLevel { window, level, opacity } => LookupTable::window_level(*window, *level, *opacity),
     };
@@ -71,7 +76,7 @@ fn table(spec: &TableSpec, base: &Path) -> Result<LookupTable, Fault> {
 }
 
 /// Per-vertex numbers.
-fn attribute(spec: &AttributeSpec, base: &Path) -> Result<Attribute, Fault> {
+fn attribute(spec: &AttributeSpec, folders: Folders) -> Result<Attribute, Fault> {
     let size = spec.scalar.size();
     let data = match &spec.values {
         AttributeValues::Inline(values) => {
@@ -86,7 +91,7 @@ fn attribute(spec: &AttributeSpec, base: &Path) -> Result<Attribute, Fault> {
             bytes
         }
         AttributeValues::File(file) => {
-            let mut bytes = read(&base.join(file), size.saturating_mul(spec.components))?;
+            let mut bytes = read(&folders.path(file)?, size.saturating_mul(spec.components))?;
             if cfg!(target_endian = "big") {
                 bytes.chunks_exact_mut(size).for_each(<[u8]>::reverse);
             }
@@ -117,8 +122,13 @@ fn write(scalar: ScalarType, value: f64, bytes: &mut Vec<u8>) {
     }
 }
 
+/// Little-endian `f32`.
+pub(super) fn numbers(bytes: &[u8]) -> Vec<f32> {
+    bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect()
+}
+
 /// A whole file, which must hold a multiple of `unit` bytes and not be endless.
-fn read(path: &Path, unit: usize) -> Result<Vec<u8>, Fault> {
+pub(super) fn read(path: &Path, unit: usize) -> Result<Vec<u8>, Fault> {
     let io = |e: std::io::Error| (format!("{}: cannot be read: {e}", path.display()), "a file of numbers".to_owned());
     let mut bytes = Vec::new();
     fs::File::open(path).map_err(io)?.take(MAX_FILE + 1).read_to_end(&mut bytes).map_err(io)?;
