@@ -35,6 +35,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+use std::{fmt, sync::Arc};
+
 use thiserror::Error;
 
 use crate::{
@@ -53,6 +55,36 @@ pub type Options = ParameterMap;
 pub struct Context {
     /// All shaders known.
     pub shaders: ShaderCatalog,
+    /// Hears how far long preparations are.
+    pub progress: Watch,
+}
+
+/// Hears how far something long is: what is done, how much of it, and of how much. By default
+/// nobody hears.
+#[derive(Clone, Default)]
+pub struct Watch(Option<Arc<Hook>>);
+
+type Hook = dyn Fn(&str, u64, u64) + Send + Sync;
+
+impl Watch {
+    /// Calls `hook` with what is being done, how much is done, and how much there is to do; from
+    /// any thread.
+    pub fn new(hook: impl Fn(&str, u64, u64) + Send + Sync + 'static) -> Self {
+        Self(Some(Arc::new(hook)))
+    }
+
+    /// Tells that `done` of `total` parts of something are done.
+    pub fn report(&self, what: &str, done: u64, total: u64) {
+        if let Some(hook) = &self.0 {
+            hook(what, done, total);
+        }
+    }
+}
+
+impl fmt::Debug for Watch {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(if self.0.is_some() { "Watch(heard)" } else { "Watch(unheard)" })
+    }
 }
 
 /// What an action can do.

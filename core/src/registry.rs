@@ -8,6 +8,7 @@ use thiserror::Error;
 use crate::{
     ActionError, Block, Context, Cylinder, Data, Declaration, Geometry, LoadError, LoadOptions, Loader, MeshData,
     Options, ParameterDecl, ParameterType, ParameterValue, Progress, RenderAction, ShaderEntry, Sphere, Volume,
+    action::Watch,
     checked::{self, CheckedAction},
     geometry::GeometryError,
     loader::{self, Content, NoProgress},
@@ -53,6 +54,7 @@ pub struct Registry {
     geometries: BTreeMap<String, (Declaration, GeometryFactory)>,
     loaders: Vec<Arc<dyn Loader>>,
     shaders: ShaderCatalog,
+    progress: Watch,
 }
 
 impl Registry {
@@ -150,13 +152,18 @@ impl Registry {
         self.actions.keys().map(String::as_str)
     }
 
+    /// Sets who hears how far long preparations of actions are, for actions made from now on.
+    pub fn set_progress(&mut self, progress: Watch) {
+        self.progress = progress;
+    }
+
     /// Makes an action.
     ///
     /// # Errors
     /// If nobody registered the name, options are wrong, or the action cannot run here.
     pub fn action(&self, name: &str, options: &Options) -> Result<Box<dyn RenderAction>, ActionError> {
         let (declaration, factory) = self.actions.get(name).ok_or_else(|| self.unknown_action(name))?;
-        let context = Context { shaders: self.shaders.clone() };
+        let context = Context { shaders: self.shaders.clone(), progress: self.progress.clone() };
         if name == "checked" {
             let mut inner = options.clone();
             let decl = declaration.parameter("of").cloned().unwrap_or_else(|| {

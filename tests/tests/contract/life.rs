@@ -254,7 +254,7 @@ impl RenderAction for Faulty {
 }
 
 fn wrapped(fault: fn(&mut Frame)) -> CheckedAction {
-    let context = Context { shaders: registry().shaders().clone() };
+    let context = Context { shaders: registry().shaders().clone(), ..Context::default() };
     CheckedAction::new(&context, Box::new(Faulty { inner: NullAction::new(&context), desc: None, fault }))
 }
 
