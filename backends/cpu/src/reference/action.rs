@@ -9,7 +9,8 @@ use volact_core::{
 
 use super::{
     options::{Classification, Method, NAME, ReferenceOptions, declaration},
-    picture::{ReferencePicture, check, integrate},
+    picture::{ReferencePicture, integrate},
+    prepare::check,
 };
 
 /// The certified reference.

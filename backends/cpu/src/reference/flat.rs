@@ -80,9 +80,8 @@ impl Gather {
     }
 }
 
-/// Gathers the value along a line, exactly. Returns the number of cells, too.
-pub(super) fn gather(medium: &Medium, grid: &Grid, voxels: &Voxels<'_>, line: &Line) -> (Gather, u64) {
-    let mut gathered = Gather::NONE;
+/// Gathers the value along a line, exactly. Returns the number of cells.
+pub(super) fn gather(gathered: &mut Gather, medium: &Medium, grid: &Grid, voxels: &Voxels<'_>, line: &Line) -> u64 {
     let mut cells = 0;
     grid.walk(line, |cell| {
         cells += 1;
@@ -105,7 +104,7 @@ pub(super) fn gather(medium: &Medium, grid: &Grid, voxels: &Voxels<'_>, line: &L
         gathered.integral_error += length * shift;
         true
     });
-    (gathered, cells)
+    cells
 }
 
 /// One picture laid over another: premultiplied, lower and upper bounds.

@@ -44,12 +44,16 @@ impl Counting {
 
     /// The segments of a line with their ends in the line's own `t`, and their numbers.
     pub fn segments(&self, line: &Line) -> impl Iterator<Item = Segment> {
+        self.segments_of(line.anchor, line.t)
+    }
+
+    /// The segments of a stretch whose `t` is counted from an anchor.
+    pub fn segments_of(&self, anchor: f64, t: [f64; 2]) -> impl Iterator<Item = Segment> {
         let Self { offset, scale, .. } = *self;
-        let there = |t: f64| offset + scale * (line.anchor + t);
-        let anchor = line.anchor;
+        let there = |t: f64| offset + scale * (anchor + t);
         let back = move |z: f64| (z - offset) / scale - anchor;
         let place = move |s: Segment| Segment { k: s.k, start: back(s.start), end: back(s.end) };
-        self.lattice.segments(there(line.t[0]), there(line.t[1])).map(place)
+        self.lattice.segments(there(t[0]), there(t[1])).map(place)
     }
 }
 
@@ -76,7 +80,7 @@ pub(super) fn sample(medium: &Medium, voxels: &Voxels<'_>, point: DVec3) -> Opti
 }
 
 /// Colour and opacity of the fields' values.
-fn classify(medium: &Medium, values: &[f64; 4]) -> [f64; 4] {
+pub(super) fn classify(medium: &Medium, values: &[f64; 4]) -> [f64; 4] {
     let mut rgba = [0.0, 0.0, 0.0, 1.0];
     for (field, value) in medium.fields.iter().zip(values) {
         let segment = field.knots.segment(field.knots.segment_of(*value));
@@ -135,15 +139,17 @@ pub(super) fn pre_integrated(
     }
 }
 
-/// Gathers the value on the lattice: at middles, or linear between ends.
+/// Gathers the value on the lattice: at middles, or linear between ends. Returns the number of
+/// samples.
 pub(super) fn gather(
+    gathered: &mut Gather,
     medium: &Medium,
     voxels: &Voxels<'_>,
     line: &Line,
     counting: &Counting,
     between_ends: bool,
-) -> (Gather, u64) {
-    let (mut gathered, mut samples) = (Gather::NONE, 0);
+) -> u64 {
+    let mut samples = 0;
     for s in counting.segments(line) {
         samples += 1;
         let at = |t: f64| sample(medium, voxels, line.point(t)).map(|v| v[0]);
@@ -152,5 +158,5 @@ pub(super) fn gather(
             gathered.add([a.min(b), a.max(b)], 0.5 * (a + b), s.length(), 0.0);
         }
     }
-    (gathered, samples)
+    samples
 }

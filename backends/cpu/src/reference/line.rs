@@ -1,16 +1,16 @@
-//! A ray in a shape's spaces, with bounds on the rounding of its positions.
-//!
-//! A ray's numbers, the shape's inverse transform and the map to samples are taken as the exact
-//! f64 that core hands over. An anchor near the middle of the shape is carried into object and
-//! index space in double-double, and positions are counted from there: `p(t) = p_a + t·d`, so
-//! that neither a distant camera nor a distant scene costs digits.
+//! A stretch of a ray inside a block, in sample coordinates, with bounds on the rounding of its
+//! positions.
 
 use volact_core::{
-    Aabb, Ray,
+    Aabb,
     glam::{DAffine3, DVec3},
 };
 
-use super::dd::Dd;
+use super::{
+    dd::Dd,
+    mark::{FINE, Mark, Stretches},
+    sight::Sight,
+};
 
 /// Half a unit in the last place of 1: the bound of one rounding.
 pub(super) const EPS: f64 = f64::EPSILON / 2.0;
@@ -20,8 +20,10 @@ pub(super) const EPS: f64 = f64::EPSILON / 2.0;
 pub(super) struct Line {
     /// The ray's `t` from which `t` is counted here.
     pub anchor: f64,
-    /// Where the block begins and ends, counted from the anchor.
+    /// Where it begins and ends, counted from the anchor.
     pub t: [f64; 2],
+    /// The same ends on the ray.
+    pub ends: [Mark; 2],
     /// Bound on the error of `t[0]`, `t[1]` and of any crossing of a cell face.
     pub dt: f64,
     /// Sample coordinates at the anchor.
@@ -32,22 +34,18 @@ pub(super) struct Line {
     pub dp: [f64; 3],
 }
 
-/// How a ray meets a block.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Hit {
-    /// Not at all, or in a point.
-    Miss,
-    /// So barely that rounding decides.
-    Graze,
-    /// Along a stretch.
-    Through(Line),
+/// What a ray meets of a block.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Lines {
+    /// The stretches in order.
+    pub lines: Vec<Line>,
+    /// The length of further ones that are so short that rounding decides what they show.
+    pub grazed: f64,
 }
 
 /// What of a shape a line needs.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Place {
-    /// World to object.
-    pub to_object: DAffine3,
     /// Object to sample coordinates.
     pub to_index: DAffine3,
     /// The box in object space.
@@ -55,52 +53,46 @@ pub(super) struct Place {
 }
 
 impl Place {
-    /// The stretch of `ray` inside the block and between near and far.
-    pub fn meet(&self, ray: &Ray) -> Hit {
+    /// Leaves what of stretches lies inside the block.
+    pub fn crop(&self, sight: &Sight, stretches: &mut Stretches) {
         if self.block.is_empty() {
-            return Hit::Miss;
+            return stretches.clear();
         }
-        let direction = self.to_object.transform_vector3(ray.direction);
-        let from = self.to_object.transform_point3(ray.origin);
-        let anchor = (self.block.center() - from).dot(direction) / direction.length_squared();
-        if !anchor.is_finite() {
-            return Hit::Miss;
+        for (a, axis) in [DVec3::X, DVec3::Y, DVec3::Z].into_iter().enumerate() {
+            let low = sight.front(&sight.object, axis, self.block.min[a]);
+            let high = sight.front(&sight.object, -axis, -self.block.max[a]);
+            match (low, high) {
+                (Some([a, b]), Some([c, d])) => {
+                    stretches.keep(a, b);
+                    stretches.keep(c, d);
+                }
+                _ => return stretches.clear(),
+            }
         }
-        let world = [0, 1, 2].map(|a| Dd::new(ray.origin[a]).add(Dd::product(anchor, ray.direction[a])));
-        let object = map_point(&self.to_object, world);
-        let object_step = map_vector(&self.to_object, ray.direction.to_array().map(Dd::new));
-        let Some(t) = self.clip(&object, object_step.map(|d| d.hi), [ray.near - anchor, ray.far - anchor]) else {
-            return Hit::Miss;
-        };
-        let reach = t[0].abs().max(t[1].abs());
-        let dt = 16.0 * EPS * reach;
-        if !reach.is_finite() || t[1] - t[0] <= -4.0 * dt {
-            return Hit::Miss;
-        }
-        if t[1] - t[0] <= 8.0 * dt {
-            return Hit::Graze;
-        }
-        let index = map_point(&self.to_index, object);
-        let step = map_vector(&self.to_index, object_step).map(|d| d.hi);
-        let dp = step.map(|d| if d == 0.0 { 0.0 } else { 16.0 * EPS * (reach * d.abs() + 1.0) + dt * d.abs() });
-        Hit::Through(Line { anchor, t, dt, index, step, dp })
     }
 
-    fn clip(&self, at: &[Dd; 3], step: [f64; 3], limits: [f64; 2]) -> Option<[f64; 2]> {
-        let [mut t0, mut t1] = limits;
-        for a in 0..3 {
-            let (lo, hi) = (-at[a].minus(self.block.min[a]), -at[a].minus(self.block.max[a]));
-            if step[a] == 0.0 {
-                if lo > 0.0 || hi < 0.0 {
-                    return None;
-                }
+    /// Stretches inside the block as lines.
+    pub fn lines(&self, sight: &Sight, stretches: &Stretches) -> Lines {
+        let mut made = Lines::default();
+        let path = sight.object.mapped(&self.to_index);
+        let step = path.step.map(|d| d.hi);
+        for ends in stretches.as_slice() {
+            let t = ends.map(|m| m.from(sight.anchor));
+            let reach = t[0].abs().max(t[1].abs());
+            if !reach.is_finite() {
                 continue;
             }
-            let (u, v) = (lo / step[a], hi / step[a]);
-            t0 = t0.max(u.min(v));
-            t1 = t1.min(u.max(v));
+            let dt = 16.0 * EPS * reach + ends[0].error.max(ends[1].error);
+            let length = t[1] - t[0];
+            if length <= 8.0 * dt {
+                made.grazed += (length + 2.0 * dt).max(0.0);
+                continue;
+            }
+            let round = |a: usize| EPS * 16.0 * (reach * step[a].abs() + 1.0) + FINE * path.at_size[a];
+            let dp = [0, 1, 2].map(|a| if step[a] == 0.0 { 0.0 } else { round(a) + dt * step[a].abs() });
+            made.lines.push(Line { anchor: sight.anchor, t, ends: *ends, dt, index: path.at, step, dp });
         }
-        Some([t0, t1])
+        made
     }
 }
 
@@ -121,12 +113,14 @@ impl Line {
     }
 }
 
-fn map_vector(map: &DAffine3, v: [Dd; 3]) -> [Dd; 3] {
+/// A vector through a map, in double-double.
+pub(super) fn map_vector(map: &DAffine3, v: [Dd; 3]) -> [Dd; 3] {
     let columns = [map.matrix3.x_axis, map.matrix3.y_axis, map.matrix3.z_axis];
     [0, 1, 2].map(|a| (0..3).fold(Dd::default(), |sum, c| sum.add(v[c].scale(columns[c][a]))))
 }
 
-fn map_point(map: &DAffine3, p: [Dd; 3]) -> [Dd; 3] {
+/// A point through a map, in double-double.
+pub(super) fn map_point(map: &DAffine3, p: [Dd; 3]) -> [Dd; 3] {
     let v = map_vector(map, p);
     [0, 1, 2].map(|a| v[a].add(Dd::new(map.translation[a])))
 }
@@ -134,39 +128,36 @@ fn map_point(map: &DAffine3, p: [Dd; 3]) -> [Dd; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use volact_core::Ray;
+
+    fn ray(origin: DVec3) -> Ray {
+        Ray { origin, direction: DVec3::Z, near: 0.0, far: f64::INFINITY, depth_zero: 0.0 }
+    }
+
+    fn meet(place: &Place, to_object: DAffine3, ray: &Ray) -> Lines {
+        let sight = Sight::new(ray, &to_object, place.block.center()).unwrap();
+        let mut stretches = Stretches::between(Mark::exact(ray.near), Mark::exact(ray.far));
+        place.crop(&sight, &mut stretches);
+        place.lines(&sight, &stretches)
+    }
 
     #[test]
     fn distant_scene_keeps_its_digits() {
         let far = DVec3::new(1e7, -3e7, 2e7);
-        let block = Aabb::new(DVec3::ZERO, DVec3::ONE);
-        let place = Place { to_object: DAffine3::from_translation(-far), to_index: DAffine3::IDENTITY, block };
-        let ray = Ray {
-            origin: far + DVec3::new(0.25, 0.5, -4.0),
-            direction: DVec3::Z,
-            near: 0.0,
-            far: f64::INFINITY,
-            depth_zero: 0.0,
-        };
-        let Hit::Through(line) = place.meet(&ray) else { panic!("the ray meets the block") };
+        let place = Place { to_index: DAffine3::IDENTITY, block: Aabb::new(DVec3::ZERO, DVec3::ONE) };
+        let met = meet(&place, DAffine3::from_translation(-far), &ray(far + DVec3::new(0.25, 0.5, -4.0)));
+        let [line] = met.lines[..] else { panic!("the ray meets the block once") };
         assert_eq!(line.point(line.t[0]), DVec3::new(0.25, 0.5, 0.0));
         assert_eq!((line.anchor + line.t[0], line.t[1] - line.t[0]), (4.0, 1.0));
-        assert!(line.dt < 1e-14);
+        assert!(line.dt < 1e-14 && line.ends[0].fine);
     }
 
     #[test]
     fn a_line_past_the_block_misses() {
-        let block = Aabb::new(DVec3::ZERO, DVec3::ONE);
-        let place = Place { to_object: DAffine3::IDENTITY, to_index: DAffine3::IDENTITY, block };
-        let ray = |x: f64| Ray {
-            origin: DVec3::new(x, 0.5, -1.0),
-            direction: DVec3::Z,
-            near: 0.0,
-            far: f64::INFINITY,
-            depth_zero: 0.0,
-        };
-        assert!(matches!(place.meet(&ray(1.5)), Hit::Miss));
-        assert!(matches!(place.meet(&ray(1.0)), Hit::Through(_)));
-        let behind = Ray { near: 3.0, ..ray(0.5) };
-        assert!(matches!(place.meet(&behind), Hit::Miss));
+        let place = Place { to_index: DAffine3::IDENTITY, block: Aabb::new(DVec3::ZERO, DVec3::ONE) };
+        let count = |r: &Ray| meet(&place, DAffine3::IDENTITY, r).lines.len();
+        let at = |x: f64| ray(DVec3::new(x, 0.5, -1.0));
+        assert_eq!((count(&at(1.5)), count(&at(1.0)), count(&at(1.0 + 1e-15))), (0, 1, 0));
+        assert_eq!(count(&Ray { near: 3.0, ..at(0.5) }), 0);
     }
 }

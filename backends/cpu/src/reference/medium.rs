@@ -99,13 +99,13 @@ impl Medium {
         table.chain(bounded).fold(1.0, f64::max)
     }
 
-    /// Whether opacity may be 1 anywhere.
-    pub fn can_be_opaque(&self) -> bool {
+    /// The highest opacity that there may be.
+    pub fn max_opacity(&self) -> f64 {
         if let Some(table) = &self.table {
-            return table.points().iter().any(|p| p.opacity >= 1.0);
+            return table.points().iter().map(|p| p.opacity).fold(0.0, f64::max);
         }
         let opacity = self.fields.iter().find(|f| f.drives[3]);
-        opacity.is_none_or(|f| f.knots.bounds(f64::NEG_INFINITY, f64::INFINITY)[3][1] >= 1.0)
+        opacity.map_or(1.0, |f| f.knots.bounds(f64::NEG_INFINITY, f64::INFINITY)[3][1])
     }
 
     /// Reads the fields at one sample; `None` where one is NaN.
@@ -149,7 +149,8 @@ impl Medium {
     }
 }
 
-fn tame_infinities(corner: &mut [f64; 8]) -> Option<()> {
+/// Makes a cell with an infinite corner infinite throughout; `None` where both signs meet.
+pub(super) fn tame_infinities<const N: usize>(corner: &mut [f64; N]) -> Option<()> {
     if corner.iter().all(|v| v.is_finite()) {
         return Some(());
     }
@@ -157,7 +158,7 @@ fn tame_infinities(corner: &mut [f64; 8]) -> Option<()> {
     match (has(f64::INFINITY), has(f64::NEG_INFINITY)) {
         (true, true) => None,
         (up, _) => {
-            *corner = [if up { f64::MAX } else { f64::MIN }; 8];
+            *corner = [if up { f64::MAX } else { f64::MIN }; N];
             Some(())
         }
     }

@@ -41,12 +41,16 @@ mod knots;
 mod lattice;
 mod line;
 mod march;
+mod mark;
 mod medium;
 mod options;
 mod overlap;
 mod picture;
 mod piece;
+mod prepare;
+mod scene;
 mod series;
+mod sight;
 
 use std::sync::Arc;
 
@@ -54,7 +58,8 @@ use volact_core::{Registry, registry::RegisterError};
 
 pub use action::ReferenceAction;
 pub use options::{Classification, Method, ReferenceOptions, declaration};
-pub use picture::{ReferencePicture, check, integrate};
+pub use picture::{ReferencePicture, integrate};
+pub use prepare::check;
 
 /// Registers the action.
 ///

@@ -1,0 +1,311 @@
+//! Rays through all shapes: stretches found, integrated, put together; shared out to threads.
+
+use std::{
+    num::NonZero,
+    sync::{
+        Mutex,
+        atomic::{AtomicUsize, Ordering},
+    },
+    thread,
+};
+
+use volact_core::{
+    ActionError, Compositing, FrameDesc, Ray, RayGrid, Viewport, frame::FrameError, resolve::ResolvedShape,
+};
+
+use super::{
+    flat::{self, Gather},
+    lattice::{self, Counting},
+    line::{EPS, Line, Lines},
+    march::{Light, March},
+    mark::{Mark, Stretches},
+    medium::Voxels,
+    options::{Classification, Method, ReferenceOptions},
+    overlap::{self, Track},
+    piece::{Cutter, Piece},
+    prepare::{Body, GridBody, Prepared, prepare},
+    sight::Sight,
+};
+
+/// All that is drawn, and for whom.
+pub(super) struct Scene<'a> {
+    frame: &'a FrameDesc,
+    options: &'a ReferenceOptions,
+    /// In the order of drawing.
+    shapes: Vec<Prepared>,
+    rays: RayGrid,
+    viewport: Viewport,
+    /// Where rays end, pixel by pixel, if something opaque was given.
+    limits: Option<Vec<f64>>,
+}
+
+/// What came of one ray.
+#[derive(Clone, Copy)]
+pub(super) struct Pixel {
+    pub light: Light,
+    pub samples: u64,
+    pub met: bool,
+}
+
+/// A shape as a ray meets it.
+struct Met<'a> {
+    shape: &'a Prepared,
+    anchor: f64,
+    way: Way<'a>,
+}
+
+/// How a ray goes through a body.
+enum Way<'a> {
+    /// Along stretches of a block.
+    Grid(&'a GridBody, Lines),
+}
+
+/// What rounding leaves open.
+#[derive(Clone, Copy, Default)]
+struct Doubt {
+    /// All of the pixel.
+    whole: bool,
+    /// No more than this in each channel.
+    width: f64,
+}
+
+impl<'a> Scene<'a> {
+    /// Makes shapes ready for a frame.
+    ///
+    /// # Errors
+    /// If the camera cannot be, a shape is refused, or a lattice is too fine.
+    pub fn new(
+        shapes: &[ResolvedShape],
+        frame: &'a FrameDesc,
+        options: &'a ReferenceOptions,
+    ) -> Result<Self, ActionError> {
+        let viewport = frame.viewport();
+        let rays = frame.camera.rays(&viewport).map_err(FrameError::from)?;
+        let limits = frame.opaque.as_ref().map(|o| o.limits(&rays, &viewport, frame.width));
+        Ok(Self { frame, options, shapes: prepare(shapes, options)?, rays, viewport, limits })
+    }
+
+    /// All rows of the viewport, shared out to threads row by row.
+    pub fn rows(&self) -> Vec<Vec<Pixel>> {
+        let all = thread::available_parallelism().map_or(1, NonZero::get);
+        let threads = if self.options.threads == 0 { all } else { self.options.threads };
+        let next = AtomicUsize::new(0);
+        let done = Mutex::new(vec![Vec::new(); self.viewport.height]);
+        let work = || {
+            let mut cutter = Cutter::default();
+            loop {
+                let y = next.fetch_add(1, Ordering::Relaxed);
+                if y >= self.viewport.height {
+                    return;
+                }
+                let row = (0..self.viewport.width).map(|x| self.pixel(x, y, &mut cutter)).collect();
+                done.lock().unwrap_or_else(|e| e.into_inner())[y] = row;
+            }
+        };
+        thread::scope(|scope| {
+            for _ in 1..threads.min(self.viewport.height) {
+                scope.spawn(work);
+            }
+            work();
+        });
+        done.into_inner().unwrap_or_else(|e| e.into_inner())
+    }
+
+    fn pixel(&self, x: usize, y: usize, cutter: &mut Cutter) -> Pixel {
+        let ray = self.rays.ray(x as f64 + 0.5, y as f64 + 0.5);
+        let limit = self.limits.as_ref().map_or(f64::INFINITY, |l| l[y * self.viewport.width + x]);
+        let seen = Stretches::between(Mark::exact(ray.near), Mark::exact(ray.far.min(limit)));
+        let brightest = self.shapes.iter().map(|s| s.brightest).fold(1.0, f64::max);
+        let mut pixel = Pixel { light: Light::NONE, samples: 0, met: false };
+        let mut doubt = Doubt::default();
+        let (mut over, mut flat) = (Vec::new(), Vec::new());
+        for shape in &self.shapes {
+            let Some(met) = self.meet(shape, &ray, &seen) else { continue };
+            pixel.met |= met.is_through() || met.grazed() > 0.0;
+            doubt.add(&met, brightest);
+            if met.is_through() {
+                if shape.compositing == Compositing::Over { over.push(met) } else { flat.push(met) }
+            }
+        }
+        if !over.is_empty() {
+            over.sort_by_key(|m| m.shape.id);
+            let (light, samples) = self.over(&ray, &over, brightest, cutter);
+            (pixel.light, pixel.samples) = (light, samples);
+            pixel.light.depth -= ray.depth_zero;
+        }
+        for met in &flat {
+            let (light, samples) = self.flat(&ray, met);
+            pixel.light = flat::over(&light, &pixel.light);
+            pixel.samples += samples;
+        }
+        doubt.widen(&mut pixel.light, brightest);
+        pixel
+    }
+
+    /// A shape on a ray, where anything of it is left by all that cuts it.
+    fn meet<'s>(&'s self, shape: &'s Prepared, ray: &Ray, seen: &Stretches) -> Option<Met<'s>> {
+        let sight = Sight::new(ray, &shape.to_object, shape.center)?;
+        let mut stretches = seen.clone();
+        let way = match &shape.body {
+            Body::Grid(body) => {
+                body.place.crop(&sight, &mut stretches);
+                sight.clip(&shape.clip, &self.frame.clip, &mut stretches);
+                Way::Grid(body, body.place.lines(&sight, &stretches))
+            }
+        };
+        Some(Met { shape, anchor: sight.anchor, way })
+    }
+
+    fn counting(&self, ray: &Ray) -> Option<Counting> {
+        let step = self.options.sample_distance;
+        match self.options.method {
+            Method::Exact => None,
+            Method::Rays => Some(Counting::rays(step)),
+            Method::Planes => Some(Counting::planes(step, ray, self.rays.axis(), self.rays.eye())),
+        }
+    }
+
+    fn flat(&self, ray: &Ray, met: &Met<'_>) -> (Light, u64) {
+        let (shape, counting) = (met.shape, self.counting(ray));
+        let ends = self.options.classification == Classification::PreIntegrated;
+        let (mut gathered, mut samples) = (Gather::NONE, 0);
+        match &met.way {
+            Way::Grid(body, met) => {
+                let voxels = Voxels::new(&body.texture);
+                for line in &met.lines {
+                    samples += match &counting {
+                        None => flat::gather(&mut gathered, &shape.medium, &body.grid, &voxels, line),
+                        Some(counting) => lattice::gather(&mut gathered, &shape.medium, &voxels, line, counting, ends),
+                    };
+                }
+            }
+        }
+        (gathered.light(shape.compositing, &shape.medium), samples)
+    }
+
+    /// The depth-composited shapes of a ray.
+    fn over(&self, ray: &Ray, shapes: &[Met<'_>], brightest: f64, cutter: &mut Cutter) -> (Light, u64) {
+        let counting = self.counting(ray);
+        let zero = shapes[0].anchor;
+        let mut march = March::new(f64::from(self.frame.depth_threshold), brightest);
+        if let [met] = shapes {
+            self.pieces(met, counting.as_ref(), cutter, |piece, _| march.advance(std::slice::from_ref(piece)));
+        } else {
+            let (tracks, snap) = self.tracks(shapes, zero, counting.as_ref(), cutter);
+            overlap::sweep(&tracks, snap, |pieces| march.advance(pieces));
+        }
+        let samples = march.stretches;
+        let mut light = march.finish();
+        light.depth += zero;
+        (light, samples)
+    }
+
+    /// Visits a shape's pieces in order, each with the stretch that it is of, until `visit` says
+    /// false.
+    fn pieces(
+        &self,
+        met: &Met<'_>,
+        counting: Option<&Counting>,
+        cutter: &mut Cutter,
+        mut visit: impl FnMut(&Piece, &Line) -> bool,
+    ) {
+        let medium = &met.shape.medium;
+        let post = self.options.classification == Classification::Post;
+        let mut goes_on = true;
+        match &met.way {
+            Way::Grid(body, met) => {
+                let voxels = Voxels::new(&body.texture);
+                for line in &met.lines {
+                    let mut visit = |piece: &Piece| {
+                        goes_on = visit(piece, line);
+                        goes_on
+                    };
+                    match counting {
+                        None => body.grid.walk(line, |cell| cutter.cut(medium, &voxels, line, cell, &mut visit)),
+                        Some(counting) if post => lattice::post(medium, &voxels, line, counting, &mut visit),
+                        Some(counting) => lattice::pre_integrated(medium, &voxels, line, counting, cutter, &mut visit),
+                    }
+                    if !goes_on {
+                        return;
+                    }
+                }
+            }
+        }
+    }
+
+    /// All shapes' pieces, counted from one zero, and the distance within which ends are one.
+    fn tracks(
+        &self,
+        shapes: &[Met<'_>],
+        zero: f64,
+        counting: Option<&Counting>,
+        cutter: &mut Cutter,
+    ) -> (Vec<Track>, f64) {
+        let mut snap = 0f64;
+        let mut tracks = Vec::with_capacity(shapes.len());
+        // Where stretches begin, the same place once.
+        let mut starts: Vec<Mark> = Vec::new();
+        for met in shapes {
+            let shift = met.anchor - zero;
+            let around = 8.0 * EPS * (met.anchor.abs() + zero.abs() + shift.abs());
+            let mut track = Track::new();
+            self.pieces(met, counting, cutter, |piece, line| {
+                snap = snap.max(2.0 * line.dt + around);
+                let entry = (piece.t[0] == line.t[0]).then(|| number_of(&mut starts, line.ends[0]));
+                track.push(Piece { t: piece.t.map(|t| t + shift), entry, ..*piece });
+                true
+            });
+            tracks.push(track);
+        }
+        (tracks, snap)
+    }
+}
+
+/// The number of a place among those that are known already; a new one if it is not the same as
+/// any of them.
+fn number_of(known: &mut Vec<Mark>, mark: Mark) -> usize {
+    let same = |m: &Mark| m.compare(&mark).is_some_and(|order| order.is_eq());
+    known.iter().position(same).unwrap_or_else(|| {
+        known.push(mark);
+        known.len() - 1
+    })
+}
+
+impl Met<'_> {
+    fn is_through(&self) -> bool {
+        match &self.way {
+            Way::Grid(_, met) => !met.lines.is_empty(),
+        }
+    }
+
+    /// The length of stretches that are too short to be integrated.
+    fn grazed(&self) -> f64 {
+        match &self.way {
+            Way::Grid(_, met) => met.grazed,
+        }
+    }
+}
+
+impl Doubt {
+    /// Counts what short stretches may show: of a depth τ at most τ times the brightest, behind
+    /// and before them.
+    fn add(&mut self, met: &Met<'_>, brightest: f64) {
+        let (shape, length) = (met.shape, met.grazed());
+        if length > 0.0 {
+            let thin = shape.compositing == Compositing::Over && shape.max_opacity < 1.0;
+            self.whole |= !thin;
+            self.width += -(-shape.max_opacity).ln_1p() * length / shape.medium.unit * brightest * 1.01;
+        }
+    }
+
+    fn widen(&self, light: &mut Light, brightest: f64) {
+        if self.whole || self.width >= brightest {
+            light.lower = [0.0; 4];
+            light.upper = [brightest, brightest, brightest, 1.0];
+        } else if self.width > 0.0 {
+            light.lower.iter_mut().for_each(|v| *v = (*v - self.width).max(0.0));
+            light.upper.iter_mut().for_each(|v| *v += self.width);
+            light.upper[3] = light.upper[3].min(1.0);
+        }
+    }
+}
