@@ -27,11 +27,14 @@ mod raw;
 mod series;
 mod slices;
 mod storage;
+mod text;
 mod tiff_pages;
 mod vti;
 mod vtk;
 mod vtk_arrays;
 mod vtk_blocks;
+mod vtk_legacy;
+mod vtk_mesh;
 mod vtk_xml;
 mod vts;
 mod vtu;
@@ -55,6 +58,7 @@ fn formats() -> Vec<Format> {
         png_series::format(),
         vtk::format(),
         vti::format(),
+        vtk_mesh::format(),
         vtu::format(),
         vts::format(),
         raw::format(),
@@ -62,7 +66,7 @@ fn formats() -> Vec<Format> {
 }
 
 /// All loaders of this crate: of volumes nrrd, metaimage, nifti, dicom, tiff, png, vtk, vti and raw,
-/// of meshes vtu and vts.
+/// of meshes vtk-mesh, vtu and vts.
 pub fn loaders() -> Vec<Arc<dyn Loader>> {
     formats().into_iter().map(|format| Arc::new(format) as Arc<dyn Loader>).collect()
 }

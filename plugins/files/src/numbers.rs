@@ -4,7 +4,7 @@ use std::path::Path;
 
 use volact_core::{Attribute, Buffer, LoadError, ScalarType, Warning, WarningCode};
 
-use crate::payload::{ByteOrder, out_of_memory, parse_number, swap_bytes};
+use crate::payload::{ByteOrder, parse_number, swap_bytes};
 
 /// The type of a stored number: one that the engine knows, or an integer of 64 bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -153,41 +153,8 @@ pub(crate) fn aligned(bytes: Vec<u8>, size: usize) -> Buffer {
     buffer.slice(0..length).unwrap_or(buffer)
 }
 
-/// The first `count` numbers of a text, separated by white space.
-pub(crate) fn parse_text(
-    path: &Path,
-    what: &str,
-    text: &[u8],
-    kind: NumberType,
-    count: u64,
-) -> Result<Numbers, LoadError> {
-    let bytes = count.saturating_mul(kind.size() as u64);
-    // A number is a digit and what separates it from the next.
-    let most = (text.len() as u64).div_ceil(2);
-    let truncated = |found: u64| {
-        let what = format!("{what}, as text of {most} numbers at most");
-        let size = kind.size() as u64;
-        Err(LoadError::Truncated { path: path.into(), what, found: found.saturating_mul(size), wanted: bytes })
-    };
-    if count > most {
-        return truncated(0);
-    }
-    let mut out = Vec::new();
-    out.try_reserve_exact(bytes as usize).map_err(|_| out_of_memory(path, bytes as usize))?;
-    let mut words = text.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
-    for n in 0..count {
-        let Some(word) = words.next() else { return truncated(n) };
-        let word = std::str::from_utf8(word).unwrap_or("\u{fffd}");
-        if !put_number(word, kind, &mut out) {
-            let word: String = word.chars().take(40).collect();
-            let wanted = format!("a number of type {}", kind.name());
-            return Err(LoadError::invalid(path, format!("number {n} of {what}"), format!("{word:?}"), wanted));
-        }
-    }
-    Ok(Numbers { kind, data: aligned(out, kind.size()) })
-}
-
-fn put_number(word: &str, kind: NumberType, out: &mut Vec<u8>) -> bool {
+/// Appends a number given as text in native byte order; `false` if it is none of that type.
+pub(crate) fn put_number(word: &str, kind: NumberType, out: &mut Vec<u8>) -> bool {
     match kind {
         NumberType::Scalar(scalar) => parse_number(word, scalar, out),
         NumberType::I64 => word.parse::<i64>().map(|v| out.extend_from_slice(&v.to_ne_bytes())).is_ok(),

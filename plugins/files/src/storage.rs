@@ -10,6 +10,8 @@ use std::{
 
 use volact_core::{Buffer, Bulk, LoadError};
 
+use crate::payload::MAP_FROM;
+
 /// The longest line that a text header may have.
 const LINE_LIMIT: u64 = 1 << 20;
 
@@ -111,6 +113,20 @@ impl Storage {
             return Err(LoadError::Truncated { path: path.into(), what, found, wanted: length });
         }
         Ok(bytes)
+    }
+
+    /// All bytes of a file: mapped if they are many and on disk, shared if they are in memory.
+    pub(crate) fn contents(&self, path: &Path) -> Result<Buffer, LoadError> {
+        let length = self.length(path)?;
+        if let Self::Memory(files) = self {
+            return Ok(Buffer::from(Arc::clone(&files[path])));
+        }
+        if length >= MAP_FROM as u64
+            && let Some(mapped) = self.map(path, 0, usize::try_from(length).unwrap_or(usize::MAX))?
+        {
+            return Ok(mapped);
+        }
+        self.range(path, 0, length).map(Buffer::from_vec)
     }
 
     /// Bytes `start..start + length` of a file on disk, mapped; `None` in memory.

@@ -14,7 +14,7 @@
 use std::path::Path;
 
 use volact_core::{
-    LoadError, LoadOptions, ParameterDecl, ParameterType, ScalarType, VolumeDesc, VolumeReader,
+    LoadError, LoadOptions, ParameterDecl, ParameterType, VolumeDesc, VolumeReader,
     glam::DVec3,
     loader::{Confidence, Probe},
 };
@@ -22,8 +22,11 @@ use volact_core::{
 use crate::{
     fields,
     format::{Format, confidence, name_of, text},
+    numbers::NumberType,
     payload::{ByteOrder, Encoding, GridReader, Part, Payload},
     storage::{Lines, Storage},
+    vtk_legacy::{Kind, dataset, kind, unescape},
+    vtk_mesh::MESHES,
     world,
 };
 
@@ -37,32 +40,11 @@ pub(crate) fn array_option() -> ParameterDecl {
 }
 
 fn probe(probe: &Probe<'_>) -> Confidence {
-    confidence(probe.head.starts_with(b"# vtk DataFile"), probe, &[".vtk"])
-}
-
-/// The numbers of an array, readable or not.
-#[derive(Clone, Copy, Debug)]
-struct Kind {
-    scalar: Option<ScalarType>,
-    bits: u64,
-}
-
-fn kind(path: &Path, text: &str) -> Result<Kind, LoadError> {
-    let (scalar, bits) = match text.to_lowercase().as_str() {
-        "unsigned_char" | "vtktypeuint8" => (Some(ScalarType::U8), 8),
-        "char" | "signed_char" | "vtktypeint8" => (Some(ScalarType::I8), 8),
-        "unsigned_short" | "vtktypeuint16" => (Some(ScalarType::U16), 16),
-        "short" | "vtktypeint16" => (Some(ScalarType::I16), 16),
-        "unsigned_int" | "vtktypeuint32" => (Some(ScalarType::U32), 32),
-        "int" | "vtktypeint32" => (Some(ScalarType::I32), 32),
-        "float" => (Some(ScalarType::F32), 32),
-        "double" => (Some(ScalarType::F64), 64),
-        "long" | "unsigned_long" | "vtktypeint64" | "vtktypeuint64" => (None, 64),
-        "vtkidtype" => (None, 32),
-        "bit" => (None, 1),
-        _ => return Err(LoadError::invalid(path, "data type", format!("{text:?}"), "a type of VTK, e.g. float")),
-    };
-    Ok(Kind { scalar, bits })
+    // Meshes of the same format have a loader of their own.
+    match dataset(probe.head) {
+        Some(kind) if MESHES.contains(&kind.as_str()) => Confidence::No,
+        _ => confidence(probe.head.starts_with(b"# vtk DataFile"), probe, &[".vtk"]),
+    }
 }
 
 /// An array found: its name, type, components and place in the file.
@@ -114,7 +96,7 @@ fn open(storage: &Storage, path: &Path, options: &LoadOptions) -> Result<Box<dyn
     };
     let array = scan.find()?;
     let dims = scan.dims.ok_or_else(|| LoadError::invalid(path, "DIMENSIONS", "missing", "three sizes"))?;
-    let Some(scalar) = array.kind.scalar else {
+    let Some(NumberType::Scalar(scalar)) = array.kind.number else {
         let what = format!("data type {:?}", array.type_name);
         let cure = "convert it to 32-bit integers or to double".into();
         return Err(LoadError::Unsupported { path: path.into(), what, cure });
@@ -155,7 +137,7 @@ impl Scan<'_> {
             match words[0].to_uppercase().as_str() {
                 "DATASET" if rest.eq_ignore_ascii_case("STRUCTURED_POINTS") => {}
                 "DATASET" => {
-                    let cure = "only STRUCTURED_POINTS are volumes".into();
+                    let cure = "only STRUCTURED_POINTS are volumes; meshes are read by the loader vtk-mesh".into();
                     return Err(LoadError::Unsupported { path: path.into(), what: format!("dataset {rest}"), cure });
                 }
                 "DIMENSIONS" => {
@@ -216,7 +198,7 @@ impl Scan<'_> {
             "TENSORS" => (arg(2)?, 9),
             "LOOKUP_TABLE" => {
                 let entries = number(2)?;
-                let size = Kind { scalar: None, bits: 8 };
+                let size = Kind { number: None, bits: 8 };
                 return self.pass(size, entries.saturating_mul(4)).map(|()| None);
             }
             _ => {
@@ -310,25 +292,4 @@ impl Scan<'_> {
         while self.lines.line()?.is_some_and(|line| !line.trim().is_empty()) {}
         Ok(())
     }
-}
-
-/// `Nodal%20Stress` is `Nodal Stress`.
-fn unescape(name: &str) -> String {
-    let bytes = name.as_bytes();
-    let mut out = Vec::new();
-    let mut at = 0;
-    while at < bytes.len() {
-        let hex = if bytes[at] == b'%' { name.get(at + 1..at + 3) } else { None };
-        match hex.and_then(|hex| u8::from_str_radix(hex, 16).ok()) {
-            Some(code) => {
-                out.push(code);
-                at += 3;
-            }
-            None => {
-                out.push(bytes[at]);
-                at += 1;
-            }
-        }
-    }
-    String::from_utf8_lossy(&out).into_owned()
 }

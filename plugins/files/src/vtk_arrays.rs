@@ -5,20 +5,14 @@ use std::path::Path;
 use volact_core::{LoadError, Progress, Warning};
 
 use crate::{
-    mesh::{Meter, Named, note},
-    numbers::{Numbers, parse_text},
+    mesh::{GHOST_CELL, GHOSTS, HIDDEN_POINT, Meter, Named, flags, note},
+    numbers::Numbers,
     payload::{ByteOrder, MAP_FROM, reserve},
     storage::Storage,
+    text::Scanner,
     vtk_blocks::{Place, locate},
     vtk_xml::{Array, Document, Piece},
 };
-
-/// Cells that belong to another piece, are refined elsewhere, lie outside or are hidden
-/// (`vtkDataSetAttributes::CellGhostTypes`).
-const GHOST_CELL: u8 = 1 | 8 | 16 | 32;
-/// Points that are hidden (`vtkDataSetAttributes::PointGhostTypes`).
-const HIDDEN_POINT: u8 = 2;
-const GHOSTS: &str = "vtkGhostType";
 
 /// Reads arrays of a document, one after another.
 pub(crate) struct ArrayReader<'a> {
@@ -51,7 +45,7 @@ impl<'a> ArrayReader<'a> {
         let numbers = match locate(self.storage, self.document, array, wanted)? {
             Place::Text { start, end } => {
                 let text = self.storage.range(path, start, end - start)?;
-                parse_text(path, &what, &text, kind, count)?
+                Scanner::new(path, &text).numbers(&what, kind, count)?
             }
             Place::Raw { start, available } => {
                 if wanted > available {
@@ -124,10 +118,7 @@ impl<'a> ArrayReader<'a> {
 
     fn flags(&mut self, piece: &Piece, section: &str, count: u64, mask: u8) -> Result<Option<Vec<bool>>, LoadError> {
         let Some(array) = piece.arrays(section).iter().find(|a| a.name == GHOSTS) else { return Ok(None) };
-        let flags = self.read(array, count)?;
-        let set = |i| flags.integer(i).is_some_and(|v| v & i64::from(mask) != 0);
-        let set: Vec<bool> = (0..flags.len()).map(set).collect();
-        Ok(set.contains(&true).then_some(set))
+        Ok(flags(&self.read(array, count)?, mask))
     }
 }
 

@@ -18,14 +18,14 @@
 use std::{collections::HashMap, path::Path, sync::Arc};
 
 use volact_core::{
-    Buffer, LoadError, LoadOptions, MeshData, Points, Progress, ScalarType, Warning,
+    LoadError, LoadOptions, MeshData, Points, Progress, Warning,
     loader::{Confidence, Probe},
 };
 
 use crate::{
     format::{Format, confidence, name_of},
-    mesh::{Attributes, CellArrays, CellLayout, Cells, Named, check_count, finite_points, note},
-    numbers::{NumberType, Numbers},
+    mesh::{Attributes, CellArrays, CellLayout, Cells, Named, check_count, codes, finite_points, note},
+    numbers::Numbers,
     storage::Storage,
     vtk_arrays::{ArrayReader, cell_data_left_out},
     vtk_xml::{self, Piece},
@@ -111,21 +111,6 @@ fn read_piece(
     let ghosts = reader.ghost_cells(piece, count)?;
     let attributes = reader.attributes(piece, vertices, file, warnings)?;
     Ok(Part { points, cells, ghosts, attributes })
-}
-
-/// Types as codes of 8 bits, shared where they are such.
-fn codes(path: &Path, types: &Numbers) -> Result<Buffer, LoadError> {
-    if matches!(types.kind, NumberType::Scalar(ScalarType::U8 | ScalarType::I8)) {
-        return Ok(types.data.clone());
-    }
-    let code = |cell: usize| {
-        let code = types.integer(cell);
-        let found = || code.map_or_else(|| format!("of type {}", types.kind.name()), |v| v.to_string());
-        let narrow = code.and_then(|v| u8::try_from(v).ok());
-        narrow.ok_or_else(|| LoadError::invalid(path, format!("type of cell {cell}"), found(), "0 to 255"))
-    };
-    let codes: Result<Vec<u8>, LoadError> = (0..types.len()).map(code).collect();
-    Ok(Buffer::from_vec(codes?))
 }
 
 /// Vertices of several pieces, of which those in the same place are one.

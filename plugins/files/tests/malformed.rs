@@ -213,7 +213,7 @@ const MESSAGES: &[(&str, &str, &str)] = &[
         r##"v.vtk: first line is "# vtk DataFile Version 9.0", wanted # vtk DataFile Version 1.0 to 5.x"##,
     ),
     ("vtk", "neither ASCII nor BINARY", r#"v.vtk: coding is "XML", wanted ASCII or BINARY"#),
-    ("vtk", "a mesh", "v.vtk: dataset UNSTRUCTURED_GRID is not supported; only STRUCTURED_POINTS are volumes"),
+    ("vtk", "a mesh", "v.vtk: dataset UNSTRUCTURED_GRID is not supported; only STRUCTURED_POINTS are volumes; meshes are read by the loader vtk-mesh"),
     ("vtk", "points that do not fit", "v.vtk: POINT_DATA is 61, wanted 60, the product of DIMENSIONS"),
     ("vtk", "no lookup table line", r#"v.vtk: line after SCALARS is "\0\0\0\0\0\0\0\0\0\0\0\0", wanted LOOKUP_TABLE"#),
     ("vtk", "unknown type", r#"v.vtk: data type is "word", wanted a type of VTK, e.g. float"#),

@@ -6,10 +6,10 @@
 
 use std::{collections::BTreeMap, ops::Range, path::Path};
 
-use volact_core::{Buffer, CellType, CellTypes, LoadError, Mesh, Points, Warning};
+use volact_core::{Buffer, CellType, CellTypes, LoadError, Mesh, Points, ScalarType, Warning};
 
 use super::note;
-use crate::numbers::Numbers;
+use crate::numbers::{NumberType, Numbers};
 
 const VOXEL: u8 = 11;
 /// Corners of a voxel in the order of a hexahedron.
@@ -92,35 +92,70 @@ pub(crate) struct CellArrays {
 pub(crate) enum CellLayout {
     /// Where each cell ends; the first begins at 0.
     Ends(Numbers),
-    #[expect(dead_code, reason = "for the legacy format, which comes next")]
     /// Where each cell begins, and where the last ends.
     Bounds(Numbers),
-    #[expect(dead_code, reason = "for the legacy format, which comes next")]
     /// Before each cell's corners stands how many they are.
     Counted,
 }
 
-impl CellArrays {
+impl CellLayout {
     /// Where a cell's corners begin and end, if the cell before it ends at `at`; -1 for what is no
     /// number.
-    fn bounds(&self, cell: usize, at: usize) -> [i64; 2] {
+    pub(super) fn bounds(&self, connectivity: &Numbers, cell: usize, at: usize) -> [i64; 2] {
         let number = |numbers: &Numbers, i: usize| numbers.integer(i).unwrap_or(-1);
-        match &self.layout {
-            CellLayout::Ends(ends) => [at as i64, number(ends, cell)],
-            CellLayout::Bounds(bounds) => [number(bounds, cell), number(bounds, cell + 1)],
-            CellLayout::Counted => {
-                let count = number(&self.connectivity, at);
+        match self {
+            Self::Ends(ends) => [at as i64, number(ends, cell)],
+            Self::Bounds(bounds) => [number(bounds, cell), number(bounds, cell + 1)],
+            Self::Counted => {
+                let count = number(connectivity, at);
                 let start = at as i64 + 1;
                 [start, if count < 0 { -1 } else { start.saturating_add(count) }]
             }
         }
     }
 
+    /// As [`bounds`](Self::bounds), inside the connectivity; `at` moves on.
+    pub(super) fn range(
+        &self,
+        path: &Path,
+        what: &dyn Fn() -> String,
+        connectivity: &Numbers,
+        cell: usize,
+        at: &mut usize,
+    ) -> Result<Range<usize>, LoadError> {
+        let length = connectivity.len();
+        let [start, end] = self.bounds(connectivity, cell, *at);
+        if start < *at as i64 || end < start || end > length as i64 {
+            let found = format!("numbers {start} to {end}");
+            let wanted = format!("between {at} and the {length} numbers of the connectivity");
+            return Err(LoadError::invalid(path, format!("place of the corners of {}", what()), found, wanted));
+        }
+        *at = end as usize;
+        Ok(start as usize..*at)
+    }
+}
+
+/// Types as codes of 8 bits, shared where they are such.
+pub(crate) fn codes(path: &Path, types: &Numbers) -> Result<Buffer, LoadError> {
+    if matches!(types.kind, NumberType::Scalar(ScalarType::U8 | ScalarType::I8)) {
+        return Ok(types.data.clone());
+    }
+    let code = |cell: usize| {
+        let code = types.integer(cell);
+        let found = || code.map_or_else(|| format!("of type {}", types.kind.name()), |v| v.to_string());
+        let narrow = code.and_then(|v| u8::try_from(v).ok());
+        narrow.ok_or_else(|| LoadError::invalid(path, format!("type of cell {cell}"), found(), "0 to 255"))
+    };
+    let codes: Result<Vec<u8>, LoadError> = (0..types.len()).map(code).collect();
+    Ok(Buffer::from_vec(codes?))
+}
+
+impl CellArrays {
     /// The first cell that has a vertex, in words.
     pub(crate) fn owner(&self, vertex: usize) -> String {
         let mut at = 0;
         for cell in 0..self.types.len() {
-            let [start, end] = self.bounds(cell, at);
+            let [start, end] = self.layout.bounds(&self.connectivity, cell, at);
             if start < 0 || end < start || end > self.connectivity.len() as i64 {
                 break;
             }
@@ -250,15 +285,7 @@ impl<'a> Cells<'a> {
 
     /// Where a cell's corners lie in the connectivity.
     fn corners(&self, cells: &CellArrays, cell: usize, code: u8, at: &mut usize) -> Result<Range<usize>, LoadError> {
-        let length = cells.connectivity.len();
-        let [start, end] = cells.bounds(cell, *at);
-        if start < *at as i64 || end < start || end > length as i64 {
-            let (what, found) = (format!("corners of {}", self.name(cell)), format!("numbers {start} to {end}"));
-            let wanted = format!("between {at} and the {length} numbers of the connectivity");
-            return Err(LoadError::invalid(self.path, what, found, wanted));
-        }
-        let range = start as usize..end as usize;
-        *at = range.end;
+        let range = cells.layout.range(self.path, &|| self.name(cell), &cells.connectivity, cell, at)?;
         let wanted = if code == VOXEL { Some(8) } else { CellType::from_code(code).map(CellType::corners) };
         if let Some(wanted) = wanted.filter(|w| *w != range.len()) {
             let what = format!("number of corners of {}", self.name(cell));

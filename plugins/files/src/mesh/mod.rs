@@ -3,6 +3,7 @@
 mod attributes;
 mod cells;
 mod structured;
+mod surface;
 mod vertices;
 
 use std::path::Path;
@@ -12,8 +13,9 @@ use volact_core::{LoadError, Progress, Warning, WarningCode};
 use crate::storage::Storage;
 
 pub(crate) use attributes::{Attributes, Named};
-pub(crate) use cells::{CellArrays, CellLayout, Cells};
-pub(crate) use structured::{Blanking, structured};
+pub(crate) use cells::{CellArrays, CellLayout, Cells, codes};
+pub(crate) use structured::{Blanking, GHOST_CELL, GHOSTS, HIDDEN_POINT, flags, structured};
+pub(crate) use surface::Triangles;
 pub(crate) use vertices::{check_count, finite_points};
 
 /// A warning about a file's content.
@@ -44,6 +46,11 @@ impl<'a> Meter<'a> {
     pub(crate) fn step(&mut self) -> Result<(), LoadError> {
         self.done = (self.done + 1).min(self.steps);
         self.tell(0, 1)
+    }
+
+    /// So many of the file's bytes are read.
+    pub(crate) fn at(&self, bytes: usize) -> Result<(), LoadError> {
+        self.tell(bytes as u64, self.total.max(1) + 1)
     }
 
     /// So much of the step under way is done.

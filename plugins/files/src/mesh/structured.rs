@@ -1,10 +1,25 @@
 //! Structured grids with parts left out.
 
-use std::path::Path;
+use std::{path::Path, sync::Arc};
 
 use volact_core::{Buffer, CellType, CellTypes, Geometry, LoadError, Mesh, Points, StructuredMesh};
 
-use std::sync::Arc;
+use crate::numbers::Numbers;
+
+/// The array of flags that marks what is no part of a grid.
+pub(crate) const GHOSTS: &str = "vtkGhostType";
+/// Cells that belong to another piece, are refined elsewhere, lie outside or are hidden
+/// (`vtkDataSetAttributes::CellGhostTypes`).
+pub(crate) const GHOST_CELL: u8 = 1 | 8 | 16 | 32;
+/// Points that are hidden (`vtkDataSetAttributes::PointGhostTypes`).
+pub(crate) const HIDDEN_POINT: u8 = 2;
+
+/// Which numbers have one of the mask's bits; `None` if none has.
+pub(crate) fn flags(numbers: &Numbers, mask: u8) -> Option<Vec<bool>> {
+    let set = |i| numbers.integer(i).is_some_and(|v| v & i64::from(mask) != 0);
+    let set: Vec<bool> = (0..numbers.len()).map(set).collect();
+    set.contains(&true).then_some(set)
+}
 
 /// What a structured grid leaves out: flags of its vertices and of its cells, `false` for what is
 /// left out.

@@ -1,0 +1,439 @@
+//! Legacy VTK files of meshes and surfaces.
+//!
+//! # Reads
+//! Versions 1 to 5, ASCII and BINARY (big-endian): `UNSTRUCTURED_GRID` (cells as counted lists or as
+//! `OFFSETS` and `CONNECTIVITY`), `STRUCTURED_GRID` (with `BLANKING`) and, as surfaces, `POLYDATA`.
+//! All point data become attributes, except the normals of surfaces: `SCALARS`, `COLOR_SCALARS`,
+//! `VECTORS`, `NORMALS`, `TENSORS`, `TEXTURE_COORDINATES`, identifiers, flags and the arrays of a
+//! `FIELD`. Percent-encoded names are decoded, `METADATA` passed over. 64-bit integers become
+//! 32-bit ones, or doubles where they do not fit. Cells that `vtkGhostType` marks are left out.
+//!
+//! # Options
+//! None.
+//!
+//! # Limits
+//! Cells without volume (in grids), vertices and lines (in surfaces), cell data, bits and strings
+//! are left out, with a warning where they carry something. Curved cells, polyhedra, rectilinear
+//! grids and fields alone are refused.
+
+use std::{path::Path, sync::Arc};
+
+use volact_core::{
+    Geometry, LoadError, LoadOptions, MeshData, Points, Progress, ScalarType, Warning,
+    loader::{Confidence, Probe},
+};
+
+use crate::{
+    fields,
+    format::{Format, name_of},
+    mesh::{
+        Attributes, Blanking, CellArrays, CellLayout, Cells, GHOST_CELL, GHOSTS, HIDDEN_POINT, Meter, Named, Triangles,
+        check_count, codes, finite_points, flags, note, structured,
+    },
+    numbers::{NumberType, Numbers},
+    storage::Storage,
+    vtk_legacy::{Kind, Legacy, dataset, kind, unescape},
+};
+
+/// The datasets that are meshes or surfaces.
+pub(crate) const MESHES: [&str; 3] = ["UNSTRUCTURED_GRID", "STRUCTURED_GRID", "POLYDATA"];
+
+/// Sections of surfaces, each with whether its cells are strips; `None` for what has no area.
+const FACES: [(&str, Option<bool>); 4] =
+    [("VERTICES", None), ("LINES", None), ("POLYGONS", Some(false)), ("TRIANGLE_STRIPS", Some(true))];
+
+/// The loader.
+pub(crate) fn format() -> Format {
+    Format::of_meshes("vtk-mesh", "legacy VTK unstructured and structured grids, and surfaces (.vtk)", probe, read)
+}
+
+fn probe(probe: &Probe<'_>) -> Confidence {
+    match dataset(probe.head) {
+        Some(kind) if MESHES.contains(&kind.as_str()) => Confidence::Content,
+        _ => Confidence::No,
+    }
+}
+
+/// What the sections of a file say.
+#[derive(Default)]
+struct Parts {
+    dataset: String,
+    dims: Option<[usize; 3]>,
+    visible: Option<Vec<u8>>,
+    points: Option<Numbers>,
+    cells: Option<(Numbers, CellLayout, u64)>,
+    types: Option<Numbers>,
+    faces: Vec<(Numbers, CellLayout, u64, bool)>,
+    thin: u64,
+    attributes: Vec<Named>,
+    normals: Option<Numbers>,
+    hidden_points: Option<Vec<bool>>,
+    ghosts: Option<Vec<bool>>,
+    cell_data: Vec<String>,
+    left_out: Vec<String>,
+}
+
+fn read(
+    storage: &Storage,
+    path: &Path,
+    _options: &LoadOptions,
+    progress: &dyn Progress,
+) -> Result<MeshData, LoadError> {
+    let contents = storage.contents(path)?;
+    let mut reader = Reader {
+        file: Legacy::open(path, contents.bytes())?,
+        parts: Parts::default(),
+        owner: Owner::Dataset,
+        meter: Meter::new(storage, path, progress, 1)?,
+    };
+    reader.sections()?;
+    let (parts, mut meter) = (reader.parts, reader.meter);
+    let name = name_of(path);
+    let mut warnings = Vec::new();
+    if !parts.cell_data.is_empty() {
+        let names = &parts.cell_data;
+        warnings.push(note(&name, format!("cell data are left out: {names:?}; convert them to point data")));
+    }
+    if !parts.left_out.is_empty() {
+        let names = &parts.left_out;
+        warnings.push(note(&name, format!("attributes that are no numbers are left out: {names:?}")));
+    }
+    let made = parts.build(path, name, warnings)?;
+    meter.step()?;
+    Ok(made)
+}
+
+/// To whom arrays belong.
+#[derive(Clone, Copy)]
+enum Owner {
+    Dataset,
+    Points(u64),
+    Cells(u64),
+}
+
+struct Reader<'a> {
+    file: Legacy<'a>,
+    parts: Parts,
+    owner: Owner,
+    meter: Meter<'a>,
+}
+
+impl Reader<'_> {
+    fn invalid(&self, what: &str, found: impl ToString, wanted: &str) -> LoadError {
+        LoadError::invalid(self.file.path(), what, found, wanted)
+    }
+
+    fn word(&mut self, what: &str) -> Result<String, LoadError> {
+        match self.file.scan.word() {
+            Some(word) if word.len() <= 4096 => Ok(String::from_utf8_lossy(word).into_owned()),
+            Some(_) => Err(self.invalid(what, "longer", "at most 4096 characters")),
+            None => Err(self.invalid(what, "missing", "one more word")),
+        }
+    }
+
+    fn number(&mut self, what: &str) -> Result<u64, LoadError> {
+        let word = self.word(what)?;
+        fields::value(self.file.path(), what, &word, "a whole number")
+    }
+
+    fn kind(&mut self, what: &str) -> Result<Kind, LoadError> {
+        let word = self.word(what)?;
+        kind(self.file.path(), &word)
+    }
+
+    /// Numbers of a type that is none of bits.
+    fn numbers(&mut self, what: &str, kind: Kind, count: u64) -> Result<Numbers, LoadError> {
+        let numbers = self.file.numbers(what, kind, count)?;
+        numbers.ok_or_else(|| self.invalid(&format!("data type of {what}"), "bit", "a type of numbers"))
+    }
+
+    fn sections(&mut self) -> Result<(), LoadError> {
+        while let Some(word) = self.file.scan.word() {
+            let word = String::from_utf8_lossy(&word[..word.len().min(40)]).to_uppercase();
+            self.section(&word)?;
+            self.meter.at(self.file.scan.offset())?;
+        }
+        Ok(())
+    }
+
+    fn section(&mut self, word: &str) -> Result<(), LoadError> {
+        match word {
+            "DATASET" => {
+                let kind = self.word(word)?.to_uppercase();
+                if !MESHES.contains(&kind.as_str()) {
+                    let cure = format!("only {} are meshes or surfaces", MESHES.join(", "));
+                    let (path, what) = (self.file.path().into(), format!("dataset {kind}"));
+                    return Err(LoadError::Unsupported { path, what, cure });
+                }
+                self.parts.dataset = kind;
+            }
+            "DIMENSIONS" => {
+                let sizes = [self.number(word)?, self.number(word)?, self.number(word)?];
+                self.parts.dims = Some(fields::dimensions(self.file.path(), word, &sizes)?);
+            }
+            "BLANKING" => {
+                let (count, kind) = (self.number(word)?, self.kind(word)?);
+                let flags = self.numbers(word, kind, count)?;
+                let visible = |i| u8::from(flags.integer(i) != Some(0));
+                self.parts.visible = Some((0..flags.len()).map(visible).collect());
+            }
+            "POINTS" => {
+                let (count, kind) = (self.number(word)?, self.kind(word)?);
+                check_count(self.file.path(), "number of POINTS", count)?;
+                self.parts.points = Some(self.numbers("POINTS", kind, count.saturating_mul(3))?);
+            }
+            "CELLS" => self.parts.cells = Some(self.cells(word)?),
+            "CELL_TYPES" => {
+                let count = self.number(word)?;
+                let int = Kind { number: Some(NumberType::Scalar(ScalarType::I32)), bits: 32 };
+                self.parts.types = Some(self.numbers(word, int, count)?);
+            }
+            "POINT_DATA" => self.owner = Owner::Points(self.number(word)?),
+            "CELL_DATA" => self.owner = Owner::Cells(self.number(word)?),
+            "METADATA" => self.file.pass_metadata(),
+            "FIELD" => self.field()?,
+            "LOOKUP_TABLE" => {
+                self.word(word)?;
+                let entries = self.number(word)?.saturating_mul(4);
+                let scalar = if self.file.ascii { ScalarType::F32 } else { ScalarType::U8 };
+                let kind = Kind { number: Some(NumberType::Scalar(scalar)), bits: 8 };
+                self.file.numbers(word, kind, entries)?;
+            }
+            _ => match FACES.iter().find(|(name, _)| *name == word) {
+                Some((_, strip)) => {
+                    let (connectivity, layout, count) = self.cells(word)?;
+                    match strip {
+                        Some(strip) => self.parts.faces.push((connectivity, layout, count, *strip)),
+                        None => self.parts.thin += count,
+                    }
+                }
+                None => self.attribute(word)?,
+            },
+        }
+        Ok(())
+    }
+
+    /// Cells as counted lists, or as offsets and connectivity.
+    fn cells(&mut self, word: &str) -> Result<(Numbers, CellLayout, u64), LoadError> {
+        let (count, size) = (self.number(word)?, self.number(word)?);
+        if !self.file.scan.peek().is_some_and(|w| w.eq_ignore_ascii_case(b"OFFSETS")) {
+            let int = Kind { number: Some(NumberType::Scalar(ScalarType::I32)), bits: 32 };
+            return Ok((self.numbers(word, int, size)?, CellLayout::Counted, count));
+        }
+        self.word("OFFSETS")?;
+        let kind = self.kind("OFFSETS")?;
+        let bounds = self.numbers("OFFSETS", kind, count)?;
+        let next = self.word("CONNECTIVITY")?;
+        if !next.eq_ignore_ascii_case("CONNECTIVITY") {
+            let found: String = next.chars().take(40).collect();
+            return Err(self.invalid("word after OFFSETS", format!("{found:?}"), "CONNECTIVITY"));
+        }
+        let kind = self.kind("CONNECTIVITY")?;
+        let connectivity = self.numbers("CONNECTIVITY", kind, size)?;
+        Ok((connectivity, CellLayout::Bounds(bounds), count.saturating_sub(1)))
+    }
+
+    /// An attribute other than a field.
+    fn attribute(&mut self, word: &str) -> Result<(), LoadError> {
+        let float = if self.file.ascii { "float" } else { "unsigned_char" };
+        let known = ["SCALARS", "COLOR_SCALARS", "VECTORS", "NORMALS", "TENSORS", "TENSORS6", "TEXTURE_COORDINATES"];
+        let single = ["GLOBAL_IDS", "PEDIGREE_IDS", "EDGE_FLAGS"];
+        if !known.contains(&word) && !single.contains(&word) {
+            return Err(self.invalid("keyword", format!("{word:?}"), "a keyword of legacy VTK files"));
+        }
+        let name = unescape(&self.word(word)?);
+        let (type_name, components) = match word {
+            "COLOR_SCALARS" => (float.to_owned(), self.number(word)?),
+            "TEXTURE_COORDINATES" => {
+                let components = self.number(word)?;
+                (self.word(word)?, components)
+            }
+            "SCALARS" => {
+                let type_name = self.word(word)?;
+                let next = self.file.scan.peek().map(<[u8]>::to_ascii_uppercase);
+                let components = if next.as_deref() == Some(b"LOOKUP_TABLE") { 1 } else { self.number(word)? };
+                let table = self.word("word after SCALARS")?;
+                if !table.eq_ignore_ascii_case("LOOKUP_TABLE") {
+                    let found: String = table.chars().take(12).collect();
+                    return Err(self.invalid("line after SCALARS", format!("{found:?}"), "LOOKUP_TABLE"));
+                }
+                self.word("LOOKUP_TABLE")?;
+                (type_name, components)
+            }
+            "VECTORS" | "NORMALS" => (self.word(word)?, 3),
+            "TENSORS" => (self.word(word)?, 9),
+            "TENSORS6" => (self.word(word)?, 6),
+            _ => (self.word(word)?, 1),
+        };
+        let (Owner::Points(tuples) | Owner::Cells(tuples)) = self.owner else {
+            return Err(self.invalid("POINT_DATA", format!("missing before {word}"), "one"));
+        };
+        self.array(name, &type_name, components, tuples, word == "NORMALS")
+    }
+
+    /// The arrays of a field.
+    fn field(&mut self) -> Result<(), LoadError> {
+        self.word("FIELD")?;
+        let count = self.number("number of arrays of FIELD")?;
+        for _ in 0..count {
+            let mut name = self.word("field array")?;
+            while name.eq_ignore_ascii_case("METADATA") {
+                self.file.pass_metadata();
+                name = self.word("field array")?;
+            }
+            if name == "NULL_ARRAY" {
+                continue;
+            }
+            let components = self.number("components of a field array")?;
+            let tuples = self.number("tuples of a field array")?;
+            let type_name = self.word("type of a field array")?;
+            let name = unescape(&name);
+            if let Owner::Points(wanted) | Owner::Cells(wanted) = self.owner
+                && tuples != wanted
+            {
+                return Err(self.invalid(&format!("tuples of {name:?}"), tuples, &format!("{wanted}")));
+            }
+            self.array(name, &type_name, components, tuples, false)?;
+        }
+        Ok(())
+    }
+
+    /// The numbers of an array, kept if they belong to points.
+    fn array(
+        &mut self,
+        name: String,
+        type_name: &str,
+        components: u64,
+        tuples: u64,
+        normals: bool,
+    ) -> Result<(), LoadError> {
+        let what = format!("array {name:?}");
+        let count = components.saturating_mul(tuples);
+        if matches!(type_name.to_lowercase().as_str(), "string" | "utf8_string") {
+            self.file.pass_strings(&what, count)?;
+            self.parts.left_out(self.owner, name);
+            return Ok(());
+        }
+        let kind = kind(self.file.path(), type_name)?;
+        let numbers = self.file.numbers(&what, kind, count)?;
+        let path = self.file.path();
+        match (numbers, self.owner) {
+            (Some(numbers), Owner::Points(_)) if name == GHOSTS => {
+                self.parts.hidden_points = flags(&numbers, HIDDEN_POINT);
+            }
+            (Some(numbers), Owner::Cells(_)) if name == GHOSTS => self.parts.ghosts = flags(&numbers, GHOST_CELL),
+            (Some(numbers), Owner::Points(_)) => {
+                let components = usize::try_from(components).unwrap_or(0);
+                if components == 0 {
+                    return Err(LoadError::invalid(path, format!("components of {name:?}"), components, "at least 1"));
+                }
+                if normals && self.parts.dataset == "POLYDATA" && self.parts.normals.is_none() {
+                    self.parts.normals = Some(numbers);
+                } else {
+                    self.parts.attributes.push(Named { name, components, numbers });
+                }
+            }
+            _ => self.parts.left_out(self.owner, name),
+        }
+        Ok(())
+    }
+}
+
+impl Parts {
+    fn left_out(&mut self, owner: Owner, name: String) {
+        match owner {
+            Owner::Points(_) => self.left_out.push(name),
+            Owner::Cells(_) => self.cell_data.push(name),
+            Owner::Dataset => {}
+        }
+    }
+
+    fn build(mut self, path: &Path, name: String, mut warnings: Vec<Warning>) -> Result<MeshData, LoadError> {
+        let missing = |what: &str| LoadError::invalid(path, what, "missing", "one");
+        let numbers = self.points.take().ok_or_else(|| missing("section POINTS"))?;
+        let geometry: Arc<dyn Geometry> = match self.dataset.as_str() {
+            "UNSTRUCTURED_GRID" => self.unstructured(path, &name, numbers, &mut warnings)?,
+            "STRUCTURED_GRID" => self.structured(path, numbers)?,
+            "POLYDATA" => self.surface(path, &name, numbers, &mut warnings)?,
+            _ => return Err(missing("keyword DATASET")),
+        };
+        let vertices = geometry.vertex_count().unwrap_or(0);
+        let mut attributes = Attributes::new(path, &name);
+        for named in self.attributes {
+            attributes.add(named, vertices, &mut warnings)?;
+        }
+        let attributes = attributes.finish();
+        Ok(MeshData { name, geometry, attributes, warnings })
+    }
+
+    fn unstructured(
+        &mut self,
+        path: &Path,
+        file: &str,
+        numbers: Numbers,
+        warnings: &mut Vec<Warning>,
+    ) -> Result<Arc<dyn Geometry>, LoadError> {
+        let missing = |what: &str| LoadError::invalid(path, what, "missing", "one");
+        let (connectivity, layout, count) = self.cells.take().ok_or_else(|| missing("section CELLS"))?;
+        let types = self.types.take().ok_or_else(|| missing("section CELL_TYPES"))?;
+        if types.len() as u64 != count {
+            let wanted = format!("{count}, one for each of CELLS");
+            return Err(LoadError::invalid(path, "number of CELL_TYPES", types.len(), wanted));
+        }
+        let arrays = CellArrays { types: codes(path, &types)?, connectivity, layout };
+        let points = finite_points(path, numbers, |vertex| arrays.owner(vertex))?;
+        let ghosts = checked(path, "cells", self.ghosts.take(), types.len())?;
+        let hidden = |cell: usize| ghosts.as_ref().is_some_and(|g| g[cell]);
+        let mut cells = Cells::new(path, 1);
+        cells.add(&arrays, points.len(), hidden, |i| i)?;
+        Ok(Arc::new(cells.finish(file, points, warnings)?))
+    }
+
+    fn structured(&mut self, path: &Path, numbers: Numbers) -> Result<Arc<dyn Geometry>, LoadError> {
+        let dims = self.dims.ok_or_else(|| LoadError::invalid(path, "section DIMENSIONS", "missing", "one"))?;
+        let [nx, ny, _] = dims;
+        let owner = |v: usize| format!("at {:?} of the grid", [v % nx, v / nx % ny, v / nx / ny]);
+        let points = finite_points(path, numbers, owner)?;
+        let hidden = checked(path, "points", self.hidden_points.take(), points.len())?;
+        let hidden = hidden.map(|h| h.into_iter().map(|h| u8::from(!h)).collect());
+        let cells = dims.iter().map(|n| n.saturating_sub(1)).product();
+        let ghosts = checked(path, "cells", self.ghosts.take(), cells)?;
+        let cells = ghosts.map(|g| g.into_iter().map(|g| !g).collect());
+        structured(path, dims, points, Blanking { vertices: self.visible.take().or(hidden), cells })
+    }
+
+    fn surface(
+        &mut self,
+        path: &Path,
+        file: &str,
+        numbers: Numbers,
+        warnings: &mut Vec<Warning>,
+    ) -> Result<Arc<dyn Geometry>, LoadError> {
+        if self.thin > 0 {
+            warnings.push(note(file, format!("{} vertices and lines are left out of the surface", self.thin)));
+        }
+        let points: Points = finite_points(path, numbers, |_| "of the surface".into())?;
+        let mut triangles = Triangles::new(path, &points);
+        for (connectivity, layout, count, strip) in self.faces.drain(..) {
+            triangles.add_all(&connectivity, &layout, count, strip)?;
+        }
+        let mut surface = triangles.finish(file, warnings)?;
+        if let Some(normals) = self.normals.take() {
+            let normals = finite_points(path, normals, |_| "a normal".into())?;
+            surface =
+                surface.with_normals(normals).map_err(|source| LoadError::Geometry { path: path.into(), source })?;
+        }
+        Ok(Arc::new(surface))
+    }
+}
+
+/// Flags, as many as there should be.
+fn checked(path: &Path, what: &str, flags: Option<Vec<bool>>, wanted: usize) -> Result<Option<Vec<bool>>, LoadError> {
+    match flags {
+        Some(flags) if flags.len() != wanted => {
+            let what = format!("number of flags {GHOSTS:?} of {what}");
+            Err(LoadError::invalid(path, what, flags.len(), wanted.to_string()))
+        }
+        flags => Ok(flags),
+    }
+}
