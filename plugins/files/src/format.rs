@@ -138,6 +138,21 @@ pub(crate) fn flag(options: &LoadOptions, name: &str) -> bool {
     matches!(options.get(name), Some(ParameterValue::Bool(true)))
 }
 
+/// A flag that may be left open.
+pub(crate) fn flag_given(options: &LoadOptions, name: &str) -> Option<bool> {
+    match options.get(name) {
+        Some(ParameterValue::Bool(value)) => Some(*value),
+        _ => None,
+    }
+}
+
+pub(crate) fn int(options: &LoadOptions, name: &str) -> Option<i64> {
+    match options.get(name) {
+        Some(ParameterValue::Int(value)) => Some(*value),
+        _ => None,
+    }
+}
+
 pub(crate) fn text<'a>(options: &'a LoadOptions, name: &str) -> Option<&'a str> {
     match options.get(name) {
         Some(ParameterValue::Choice(word)) => Some(word),

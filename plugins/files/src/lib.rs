@@ -22,6 +22,7 @@ mod nrrd;
 mod numbers;
 mod payload;
 pub mod picture;
+mod plot3d;
 mod png_series;
 mod raw;
 mod series;
@@ -36,6 +37,7 @@ mod vtk_blocks;
 mod vtk_legacy;
 mod vtk_mesh;
 mod vtk_xml;
+mod vtp;
 mod vts;
 mod vtu;
 mod world;
@@ -61,12 +63,14 @@ fn formats() -> Vec<Format> {
         vtk_mesh::format(),
         vtu::format(),
         vts::format(),
+        vtp::format(),
+        plot3d::format(),
         raw::format(),
     ]
 }
 
 /// All loaders of this crate: of volumes nrrd, metaimage, nifti, dicom, tiff, png, vtk, vti and raw,
-/// of meshes vtk-mesh, vtu and vts.
+/// of meshes vtk-mesh, vtu, vts, vtp and plot3d.
 pub fn loaders() -> Vec<Arc<dyn Loader>> {
     formats().into_iter().map(|format| Arc::new(format) as Arc<dyn Loader>).collect()
 }

@@ -78,6 +78,24 @@ impl<'a> ArrayReader<'a> {
         Ok(numbers)
     }
 
+    /// The numbers of a piece's points, three each.
+    pub(crate) fn points(&mut self, piece: &Piece, count: u64) -> Result<Numbers, LoadError> {
+        let Some(array) = piece.arrays("Points").first() else {
+            return Err(LoadError::invalid(self.path(), "array of Points", "missing", "one"));
+        };
+        self.read(array, count.saturating_mul(3))
+    }
+
+    /// The length of the connectivity whose cells end at `ends`.
+    pub(crate) fn length(&self, ends: &Numbers) -> Result<u64, LoadError> {
+        let Some(last) = ends.len().checked_sub(1) else { return Ok(0) };
+        let end = ends.integer(last);
+        end.and_then(|n| u64::try_from(n).ok()).ok_or_else(|| {
+            let found = end.map_or("no whole number".into(), |n| n.to_string());
+            LoadError::invalid(self.path(), "last of offsets", found, "the length of connectivity")
+        })
+    }
+
     /// The arrays of a piece's point data, as attributes of `vertices` vertices, without those that
     /// hold no numbers.
     pub(crate) fn attributes(

@@ -415,7 +415,7 @@ impl Parts {
         let points: Points = finite_points(path, numbers, |_| "of the surface".into())?;
         let mut triangles = Triangles::new(path, &points);
         for (connectivity, layout, count, strip) in self.faces.drain(..) {
-            triangles.add_all(&connectivity, &layout, count, strip)?;
+            triangles.add_all(&connectivity, &layout, count, strip, 0..points.len())?;
         }
         let mut surface = triangles.finish(file, warnings)?;
         if let Some(normals) = self.normals.take() {

@@ -65,10 +65,7 @@ fn read(
     let vertices = check_count(path, "number of vertices of Piece Extent", count)?;
     cell_data_left_out(&document, &name, &mut warnings);
     let mut reader = ArrayReader::new(storage, &document, progress)?;
-    let Some(array) = piece.arrays("Points").first() else {
-        return Err(LoadError::invalid(path, "array of Points", "missing", "one"));
-    };
-    let numbers = reader.read(array, count.saturating_mul(3))?;
+    let numbers = reader.points(piece, count)?;
     let [nx, ny, _] = dims;
     let owner = |v: usize| format!("at {:?} of the grid", [v % nx, v / nx % ny, v / nx / ny]);
     let points = finite_points(path, numbers, owner)?;

@@ -15,7 +15,7 @@
 //! Cells without volume and cell data are left out, with a warning. Curved cells, polyhedra and
 //! lzma compression are refused. An attribute of a file of several pieces must be in all of them.
 
-use std::{collections::HashMap, path::Path, sync::Arc};
+use std::{path::Path, sync::Arc};
 
 use volact_core::{
     LoadError, LoadOptions, MeshData, Points, Progress, Warning,
@@ -24,8 +24,7 @@ use volact_core::{
 
 use crate::{
     format::{Format, confidence, name_of},
-    mesh::{Attributes, CellArrays, CellLayout, Cells, Named, check_count, codes, finite_points, note},
-    numbers::Numbers,
+    mesh::{CellArrays, CellLayout, Cells, Joined, Named, check_count, codes, finite_points, merge},
     storage::Storage,
     vtk_arrays::{ArrayReader, cell_data_left_out},
     vtk_xml::{self, Piece},
@@ -94,88 +93,12 @@ fn read_piece(
     let count = piece.count(path, "NumberOfCells")?;
     let types = reader.read(piece.array(path, "Cells", "types")?, count)?;
     let ends = reader.read(piece.array(path, "Cells", "offsets")?, count)?;
-    let length = match count.checked_sub(1) {
-        Some(last) => ends.integer(last as usize).and_then(|n| u64::try_from(n).ok()),
-        None => Some(0),
-    };
-    let Some(length) = length else {
-        return Err(LoadError::invalid(path, "offsets", "no whole number at the end", "the length of connectivity"));
-    };
+    let length = reader.length(&ends)?;
     let connectivity = reader.read(piece.array(path, "Cells", "connectivity")?, length)?;
     let cells = CellArrays { types: codes(path, &types)?, connectivity, layout: CellLayout::Ends(ends) };
-    let Some(array) = piece.arrays("Points").first() else {
-        return Err(LoadError::invalid(path, "array of Points", "missing", "one"));
-    };
-    let numbers = reader.read(array, vertices as u64 * 3)?;
+    let numbers = reader.points(piece, vertices as u64)?;
     let points = finite_points(path, numbers, |vertex| cells.owner(vertex))?;
     let ghosts = reader.ghost_cells(piece, count)?;
     let attributes = reader.attributes(piece, vertices, file, warnings)?;
     Ok(Part { points, cells, ghosts, attributes })
-}
-
-/// Vertices of several pieces, of which those in the same place are one.
-#[derive(Default)]
-struct Joined {
-    first: HashMap<[u64; 3], u32>,
-    count: u32,
-}
-
-impl Joined {
-    /// The numbers of the next piece's vertices.
-    fn places(&mut self, path: &Path, points: &Points) -> Result<Vec<u32>, LoadError> {
-        check_count(path, "number of points of all pieces", u64::from(self.count) + points.len() as u64)?;
-        let place = |(i, p): (usize, volact_core::glam::DVec3)| {
-            // Adding zero makes one of both zeros.
-            let key = p.to_array().map(|v| (v + 0.0).to_bits());
-            *self.first.entry(key).or_insert(self.count + i as u32)
-        };
-        let places = points.iter().enumerate().map(place).collect();
-        self.count += points.len() as u32;
-        Ok(places)
-    }
-}
-
-type Merged = (Points, Vec<volact_core::Attribute>);
-
-/// The vertices and attributes of all pieces, one after another.
-fn merge(
-    path: &Path,
-    file: &str,
-    mut parts: Vec<(Points, Vec<Named>)>,
-    warnings: &mut Vec<Warning>,
-) -> Result<Merged, LoadError> {
-    let mut attributes = Attributes::new(path, file);
-    if parts.len() == 1 {
-        let (points, all) = parts.remove(0);
-        for named in all {
-            attributes.add(named, points.len(), warnings)?;
-        }
-        return Ok((points, attributes.finish()));
-    }
-    let names: Vec<String> = parts[0].1.iter().map(|a| a.name.clone()).collect();
-    let vertices = parts.iter().map(|(points, _)| points.len()).sum();
-    for name in names {
-        let mut joined: Option<Named> = None;
-        let mut bytes = Vec::new();
-        for (_, all) in &parts {
-            let found = all.iter().find(|a| a.name == name);
-            let same = |a: &&Named| {
-                joined.as_ref().is_none_or(|j| (j.components, j.numbers.kind) == (a.components, a.numbers.kind))
-            };
-            let Some(found) = found.filter(same) else {
-                warnings.push(note(file, format!("attribute {name:?} is left out: not the same in all pieces")));
-                joined = None;
-                break;
-            };
-            bytes.extend_from_slice(found.numbers.data.bytes());
-            let (name, components, numbers) = (name.clone(), found.components, found.numbers.clone());
-            joined = Some(Named { name, components, numbers });
-        }
-        if let Some(mut joined) = joined {
-            joined.numbers = Numbers::from_native(joined.numbers.kind, bytes);
-            attributes.add(joined, vertices, warnings)?;
-        }
-    }
-    let points = parts.iter().flat_map(|(points, _)| points.iter()).collect();
-    Ok((points, attributes.finish()))
 }

@@ -127,3 +127,26 @@ fn every_mesh_is_as_its_oracle_says() {
         check_attributes(&name, &entry, &mesh);
     }
 }
+
+/// Both files hold the same numbers, so that whatever is drawn of one is drawn of the other.
+#[test]
+fn structured_grids_equal_their_plot3d_originals() {
+    let Some(folder) = data() else { return };
+    let pairs = [
+        ("blunt_fin_curvilinear", "bluntfinxyz.bin", "blunt_fin.vts"),
+        ("combustor_curvilinear", "combxyz.bin", "combustor.vts"),
+    ];
+    for (name, plot3d, vts) in pairs {
+        let original = load(&folder.join(name).join(plot3d));
+        let derived = load(&folder.join(name).join(vts));
+        check(name, plot3d, &manifest(&folder)[name], &original);
+        check_attributes(name, &manifest(&folder)[name], &original);
+        assert_eq!(points(&original), points(&derived), "{name}");
+        let dims = |mesh: &MeshData| mesh.geometry.as_any().downcast_ref::<StructuredMesh>().unwrap().dims();
+        assert_eq!(dims(&original), dims(&derived), "{name}");
+        for attribute in &derived.attributes {
+            let other = original.attribute(&attribute.name).unwrap();
+            assert_eq!(other.data.bytes(), attribute.data.bytes(), "{name}/{}", attribute.name);
+        }
+    }
+}

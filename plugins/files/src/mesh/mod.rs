@@ -12,11 +12,11 @@ use volact_core::{LoadError, Progress, Warning, WarningCode};
 
 use crate::storage::Storage;
 
-pub(crate) use attributes::{Attributes, Named};
+pub(crate) use attributes::{Attributes, Named, merge};
 pub(crate) use cells::{CellArrays, CellLayout, Cells, codes};
-pub(crate) use structured::{Blanking, GHOST_CELL, GHOSTS, HIDDEN_POINT, flags, structured};
+pub(crate) use structured::{Blanking, GHOST_CELL, GHOSTS, HIDDEN_POINT, flags, hexahedra, structured};
 pub(crate) use surface::Triangles;
-pub(crate) use vertices::{check_count, finite_points};
+pub(crate) use vertices::{Joined, check_count, finite_points};
 
 /// A warning about a file's content.
 pub(crate) fn note(file: &str, message: impl Into<String>) -> Warning {

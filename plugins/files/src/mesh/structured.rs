@@ -29,10 +29,10 @@ pub(crate) struct Blanking {
     pub(crate) cells: Option<Vec<bool>>,
 }
 
-/// The hexahedra of a grid of `dims` vertices, x fastest, whose first vertex is `first`.
-pub(crate) fn hexahedra(dims: [usize; 3], first: u32) -> impl Iterator<Item = [u32; 8]> {
+/// The hexahedra of a grid of `dims` vertices, x fastest.
+pub(crate) fn hexahedra(dims: [usize; 3]) -> impl Iterator<Item = [u32; 8]> {
     let [nx, ny, nz] = dims;
-    let at = move |x: usize, y: usize, z: usize| first + ((z * ny + y) * nx + x) as u32;
+    let at = move |x: usize, y: usize, z: usize| ((z * ny + y) * nx + x) as u32;
     let rows = (0..nz.saturating_sub(1)).flat_map(move |z| (0..ny.saturating_sub(1)).map(move |y| (y, z)));
     rows.flat_map(move |(y, z)| {
         (0..nx.saturating_sub(1)).map(move |x| {
@@ -64,7 +64,7 @@ pub(crate) fn structured(
     let seen = |corners: &[u32; 8]| {
         blanking.vertices.as_ref().is_none_or(|v| corners.iter().all(|&i| v.get(i as usize) != Some(&0)))
     };
-    let kept = hexahedra(dims, 0).zip(cells).filter(|(corners, visible)| *visible && seen(corners));
+    let kept = hexahedra(dims).zip(cells).filter(|(corners, visible)| *visible && seen(corners));
     let connectivity: Vec<u32> = kept.flat_map(|(corners, _)| corners).collect();
     if connectivity.is_empty() {
         return Err(LoadError::invalid(path, "number of cells that are not blanked", 0, "at least 1"));

@@ -1,6 +1,6 @@
 //! Surfaces: polygons of any number of corners, cut into triangles.
 
-use std::path::Path;
+use std::{ops::Range, path::Path};
 
 use volact_core::{Buffer, LoadError, Points, Surface, Warning, glam::DVec3};
 
@@ -25,7 +25,7 @@ impl<'a> Triangles<'a> {
         Self { path, points, triangles: Vec::new(), thin: 0, faces: 0 }
     }
 
-    /// Takes a polygon, or a strip of triangles, whose corners are numbers of vertices.
+    /// Takes a polygon, or a strip of triangles, whose corners count from the first of `vertices`.
     ///
     /// # Errors
     /// If a vertex is not there, or a polygon of very many corners is not convex.
@@ -33,14 +33,15 @@ impl<'a> Triangles<'a> {
         &mut self,
         corners: impl ExactSizeIterator<Item = Option<i64>>,
         strip: bool,
+        vertices: Range<usize>,
     ) -> Result<(), LoadError> {
         let face = self.faces;
         self.faces += 1;
-        let count = self.points.len();
+        let count = vertices.len();
         let mut known = Vec::with_capacity(corners.len());
         for corner in corners {
             match corner.and_then(|c| usize::try_from(c).ok()).filter(|&c| c < count) {
-                Some(index) => known.push(index as u32),
+                Some(index) => known.push((vertices.start + index) as u32),
                 None => {
                     let found = corner.map_or("no whole number".into(), |c| c.to_string());
                     let what = format!("vertex index of face {face}");
@@ -62,7 +63,7 @@ impl<'a> Triangles<'a> {
         Ok(())
     }
 
-    /// Takes `count` polygons or strips of VTK's arrays.
+    /// Takes `count` polygons or strips of VTK's arrays, whose corners are numbers of `vertices`.
     ///
     /// # Errors
     /// As [`add`](Self::add), and if corners are not where the connectivity has them.
@@ -72,12 +73,13 @@ impl<'a> Triangles<'a> {
         layout: &CellLayout,
         count: u64,
         strip: bool,
+        vertices: Range<usize>,
     ) -> Result<(), LoadError> {
         let mut at = 0;
         for cell in 0..usize::try_from(count).unwrap_or(usize::MAX) {
             let face = self.faces;
             let range = layout.range(self.path, &|| format!("face {face}"), connectivity, cell, &mut at)?;
-            self.add(range.map(|i| connectivity.integer(i)), strip)?;
+            self.add(range.map(|i| connectivity.integer(i)), strip, vertices.clone())?;
         }
         Ok(())
     }
@@ -172,7 +174,7 @@ mod tests {
     fn areas(corners: &[[f64; 2]]) -> (f64, usize) {
         let points: Points = corners.iter().map(|[x, y]| DVec3::new(*x, *y, x + 2.0 * y)).collect();
         let mut triangles = Triangles::new(Path::new("p"), &points);
-        triangles.add((0..corners.len()).map(|i| Some(i as i64)), false).unwrap();
+        triangles.add((0..corners.len()).map(|i| Some(i as i64)), false, 0..corners.len()).unwrap();
         let surface = triangles.finish("p", &mut Vec::new()).unwrap();
         let area = |t: &[u32; 3]| {
             let [a, b, c] = t.map(|i| corners[i as usize]);
@@ -219,7 +221,7 @@ mod tests {
             .into_iter()
             .collect();
         let mut triangles = Triangles::new(Path::new("p"), &points);
-        triangles.add((0..5u8).map(|i| Some(i64::from(i))), true).unwrap();
+        triangles.add((0..5u8).map(|i| Some(i64::from(i))), true, 0..5).unwrap();
         let surface = triangles.finish("p", &mut Vec::new()).unwrap();
         assert_eq!(surface.triangles(), [[0, 1, 2], [2, 1, 3], [2, 3, 4]]);
     }
@@ -228,8 +230,8 @@ mod tests {
     fn faces_that_are_none_are_left_out_or_refused() {
         let points: Points = [DVec3::ZERO, DVec3::X, DVec3::Y].into_iter().collect();
         let mut triangles = Triangles::new(Path::new("p"), &points);
-        triangles.add([Some(0), Some(1)].into_iter(), false).unwrap();
-        let error = triangles.add([Some(0), Some(1), Some(3)].into_iter(), false).unwrap_err().to_string();
+        triangles.add([Some(0), Some(1)].into_iter(), false, 0..3).unwrap();
+        let error = triangles.add([Some(0), Some(1), Some(3)].into_iter(), false, 0..3).unwrap_err().to_string();
         assert_eq!(error, "p: vertex index of face 1 is 3, wanted from 0, below 3");
         let error = triangles.finish("p", &mut Vec::new()).unwrap_err().to_string();
         assert_eq!(error, "p: number of triangles (of 2 faces) is 0, wanted at least 1");

@@ -1,8 +1,8 @@
 //! Vertices: as many as 32 bits can name, all of them finite.
 
-use std::path::Path;
+use std::{collections::HashMap, path::Path};
 
-use volact_core::{Buffer, LoadError, Points, ScalarType};
+use volact_core::{Buffer, LoadError, Points, ScalarType, glam::DVec3};
 
 use crate::numbers::{NumberType, Numbers};
 
@@ -49,4 +49,26 @@ pub(crate) fn finite_points(
 
 fn not_finite<T>(values: Option<&[T]>, finite: impl Fn(&T) -> bool) -> Option<usize> {
     values.and_then(|v| v.iter().position(|v| !finite(v)))
+}
+
+/// Vertices of several parts of a mesh, of which those in the same place are one.
+#[derive(Default)]
+pub(crate) struct Joined {
+    first: HashMap<[u64; 3], u32>,
+    count: u32,
+}
+
+impl Joined {
+    /// The numbers of the next part's vertices.
+    pub(crate) fn places(&mut self, path: &Path, points: &Points) -> Result<Vec<u32>, LoadError> {
+        check_count(path, "number of vertices of all parts", u64::from(self.count) + points.len() as u64)?;
+        let place = |(i, p): (usize, DVec3)| {
+            // Adding zero makes one of both zeros.
+            let key = p.to_array().map(|v| (v + 0.0).to_bits());
+            *self.first.entry(key).or_insert(self.count + i as u32)
+        };
+        let places = points.iter().enumerate().map(place).collect();
+        self.count += points.len() as u32;
+        Ok(places)
+    }
 }
