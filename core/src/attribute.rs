@@ -48,7 +48,7 @@ impl Attribute {
             let (found, wanted) = (components.to_string(), "at least 1".to_owned());
             return Err(AttributeError { name, what: "number of components", found, wanted });
         };
-        if data.is_empty() || data.len() % vertex != 0 {
+        if data.is_empty() || !data.len().is_multiple_of(vertex) {
             let (found, wanted) = (data.len().to_string(), format!("a multiple of {vertex} above 0"));
             return Err(AttributeError { name, what: "number of bytes", found, wanted });
         }

@@ -184,7 +184,7 @@ pub enum LoadError {
         /// The file.
         path: PathBuf,
         /// Why.
-        source: crate::geometry::GeometryError,
+        source: Box<crate::geometry::GeometryError>,
     },
     /// Numbers that do not go with the mesh's vertices.
     #[error("{}: holds an attribute that cannot be", path.display())]
@@ -192,7 +192,7 @@ pub enum LoadError {
         /// The file.
         path: PathBuf,
         /// Why.
-        source: crate::attribute::AttributeError,
+        source: Box<crate::attribute::AttributeError>,
     },
 }
 
@@ -200,6 +200,11 @@ impl LoadError {
     /// An I/O error about a path.
     pub fn io(path: &Path, source: std::io::Error) -> Self {
         Self::Io { path: path.into(), source }
+    }
+
+    /// What a file describes is no mesh.
+    pub fn geometry(path: &Path, source: crate::geometry::GeometryError) -> Self {
+        Self::Geometry { path: path.into(), source: Box::new(source) }
     }
 
     /// A contradiction in a file.

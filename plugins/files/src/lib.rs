@@ -20,13 +20,16 @@ mod metaimage;
 mod nifti;
 mod nrrd;
 mod numbers;
+mod obj;
 mod payload;
 pub mod picture;
 mod plot3d;
+mod ply;
 mod png_series;
 mod raw;
 mod series;
 mod slices;
+mod stl;
 mod storage;
 mod text;
 mod tiff_pages;
@@ -65,12 +68,16 @@ fn formats() -> Vec<Format> {
         vts::format(),
         vtp::format(),
         plot3d::format(),
+        obj::format(),
+        ply::format(),
+        stl::format(),
         raw::format(),
     ]
 }
 
 /// All loaders of this crate: of volumes nrrd, metaimage, nifti, dicom, tiff, png, vtk, vti and raw,
-/// of meshes vtk-mesh, vtu, vts, vtp and plot3d.
+/// of meshes vtk-mesh, vtu, vts, vtp, plot3d, obj, ply and
+/// stl.
 pub fn loaders() -> Vec<Arc<dyn Loader>> {
     formats().into_iter().map(|format| Arc::new(format) as Arc<dyn Loader>).collect()
 }

@@ -137,7 +137,7 @@ impl Numbers {
             warnings.push(Warning::new(WarningCode::FileContent, file, message));
         }
         Attribute::new(name, scalar, components, data)
-            .map_err(|source| LoadError::Attribute { path: path.into(), source })
+            .map_err(|source| LoadError::Attribute { path: path.into(), source: Box::new(source) })
     }
 }
 

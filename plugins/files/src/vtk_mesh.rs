@@ -420,8 +420,7 @@ impl Parts {
         let mut surface = triangles.finish(file, warnings)?;
         if let Some(normals) = self.normals.take() {
             let normals = finite_points(path, normals, |_| "a normal".into())?;
-            surface =
-                surface.with_normals(normals).map_err(|source| LoadError::Geometry { path: path.into(), source })?;
+            surface = surface.with_normals(normals).map_err(|source| LoadError::geometry(path, source))?;
         }
         Ok(Arc::new(surface))
     }

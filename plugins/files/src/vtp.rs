@@ -97,7 +97,7 @@ fn read(
         let normals = attributes.remove(at);
         let numbers = Numbers { kind: crate::numbers::NumberType::Scalar(normals.scalar), data: normals.data };
         let normals = finite_points(path, numbers, |_| "a normal".into())?;
-        surface = surface.with_normals(normals).map_err(|source| LoadError::Geometry { path: path.into(), source })?;
+        surface = surface.with_normals(normals).map_err(|source| LoadError::geometry(path, source))?;
     }
     Ok(MeshData { name, geometry: Arc::new(surface), attributes, warnings })
 }

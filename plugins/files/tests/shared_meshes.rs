@@ -120,8 +120,8 @@ fn every_mesh_is_as_its_oracle_says() {
     assert_eq!(manifest.len(), 5, "meshes in the manifest");
     for (name, entry) in manifest {
         let files = entry["files"].as_object().unwrap().keys();
-        let known = files.filter(|f| [".vtu", ".vts", ".vtk"].iter().any(|e| f.ends_with(e)));
-        let file = known.last().unwrap();
+        let mut known = files.filter(|f| [".vtu", ".vts", ".vtk"].iter().any(|e| f.ends_with(e)));
+        let file = known.next_back().unwrap();
         let mesh = load(&folder.join(&name).join(file));
         check(&name, file, &entry, &mesh);
         check_attributes(&name, &entry, &mesh);

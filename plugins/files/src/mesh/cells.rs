@@ -276,7 +276,7 @@ impl<'a> Cells<'a> {
             Some(all) => CellTypes::All(all),
             None => CellTypes::Each(types),
         };
-        Mesh::new(points, types, connectivity).map_err(|source| LoadError::Geometry { path: self.path.into(), source })
+        Mesh::new(points, types, connectivity).map_err(|source| LoadError::geometry(self.path, source))
     }
 
     fn name(&self, cell: usize) -> String {

@@ -50,7 +50,7 @@ pub(crate) fn structured(
     points: Points,
     blanking: Blanking,
 ) -> Result<Arc<dyn Geometry>, LoadError> {
-    let wrong = |source| LoadError::Geometry { path: path.into(), source };
+    let wrong = |source| LoadError::geometry(path, source);
     let Some(cells) = blanking.cells else {
         let mut mesh = StructuredMesh::new(dims, points).map_err(wrong)?;
         if let Some(visible) = blanking.vertices {

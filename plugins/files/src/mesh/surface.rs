@@ -94,7 +94,7 @@ impl<'a> Triangles<'a> {
             return Err(LoadError::invalid(self.path, what, 0, "at least 1"));
         }
         Surface::new(self.points.clone(), Buffer::from_vec(self.triangles))
-            .map_err(|source| LoadError::Geometry { path: self.path.into(), source })
+            .map_err(|source| LoadError::geometry(self.path, source))
     }
 
     fn polygon(&mut self, face: usize, corners: Vec<u32>) -> Result<(), LoadError> {

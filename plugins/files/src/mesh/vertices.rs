@@ -44,7 +44,7 @@ pub(crate) fn finite_points(
         let what = format!("vertex {vertex} ({})", owner(vertex));
         return Err(LoadError::invalid(path, what, format!("{found:?}"), "three finite numbers"));
     }
-    Points::new(scalar, data).map_err(|source| LoadError::Geometry { path: path.into(), source })
+    Points::new(scalar, data).map_err(|source| LoadError::geometry(path, source))
 }
 
 fn not_finite<T>(values: Option<&[T]>, finite: impl Fn(&T) -> bool) -> Option<usize> {

@@ -238,7 +238,7 @@ mod tests {
 
     fn grid(layout: Layout, dims: &[[u32; 3]]) -> Vec<u8> {
         let mut out = Vec::new();
-        let mut record = |body: Vec<u8>, out: &mut Vec<u8>| {
+        let record = |body: Vec<u8>, out: &mut Vec<u8>| {
             let mark = match layout.order {
                 ByteOrder::Big => (body.len() as u32).to_be_bytes(),
                 ByteOrder::Little => (body.len() as u32).to_le_bytes(),

@@ -179,7 +179,7 @@ fn joined(path: &Path, grids: &[Grid]) -> Result<Arc<dyn Geometry>, LoadError> {
     }
     let points = grids.iter().flat_map(|grid| grid.points.iter()).collect();
     let mesh = Mesh::new(points, CellTypes::All(CellType::Hexahedron), Buffer::from_vec(connectivity));
-    Ok(Arc::new(mesh.map_err(|source| LoadError::Geometry { path: path.into(), source })?))
+    Ok(Arc::new(mesh.map_err(|source| LoadError::geometry(path, source))?))
 }
 
 /// A file of numbers for the vertices of a grid.
