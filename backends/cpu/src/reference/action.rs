@@ -118,8 +118,8 @@ impl RenderAction for ReferenceAction {
         let compositing =
             vec![Compositing::Over, Compositing::Maximum, Compositing::Minimum, Compositing::Average, Compositing::Add];
         Caps {
-            shaders: names(&["simple", "lut", "mip", "minip", "average", "xray"]),
-            geometries: names(&["block"]),
+            shaders: names(&["simple", "lut", "mip", "minip", "average", "xray", "attribute"]),
+            geometries: None,
             compositing,
             overlap: true,
             depth: true,

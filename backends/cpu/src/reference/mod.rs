@@ -33,6 +33,7 @@
 
 mod action;
 mod border;
+mod carried;
 mod cells;
 mod cubic;
 mod dd;
@@ -43,14 +44,17 @@ mod line;
 mod march;
 mod mark;
 mod medium;
+mod mesh;
 mod options;
 mod overlap;
+mod passage;
 mod picture;
 mod piece;
 mod prepare;
 mod scene;
 mod series;
 mod sight;
+mod tetra;
 
 use std::sync::Arc;
 

@@ -1,15 +1,18 @@
 //! Shapes checked and made ready.
 
 use volact_core::{
-    ActionError, Clip, Compositing, VolumeTexture,
+    Aabb, ActionError, Clip, Compositing, Tessellation, VolumeTexture,
     glam::{DAffine3, DVec3},
+    parameter::{ParameterProblem, ProblemKind},
     resolve::ResolvedShape,
 };
 
 use super::{
+    carried::{Carried, Cells},
     cells::Grid,
     line::Place,
     medium::{Medium, Voxels},
+    mesh::Mesh,
     options::{Method, NAME, ReferenceOptions},
 };
 
@@ -37,9 +40,13 @@ pub(super) struct Prepared {
 pub(super) enum Body {
     /// A volume in a block.
     Grid(GridBody),
+    /// A volume in a mesh, read by position.
+    Carved(Mesh, GridBody),
+    /// A mesh whose tetrahedra carry what is drawn.
+    Cells(Cells),
 }
 
-/// A volume in a block.
+/// A volume, and the block that it fills.
 pub(super) struct GridBody {
     pub texture: VolumeTexture,
     pub grid: Grid,
@@ -52,26 +59,58 @@ const MAX_SAMPLES: f64 = 1e9;
 /// Refuses what cannot be drawn.
 ///
 /// # Errors
-/// If the geometry is no block, the shader is not known here or reads a component that is not
-/// there.
+/// If the geometry is damaged or holds no volume, the shader is not known here, reads a component
+/// that is not there, or an attribute does not go with the vertices.
 pub fn check(shape: &ResolvedShape) -> Result<(), ActionError> {
     let refuse = |what: String, cure: &str| {
         Err(ActionError::Unsupported { action: NAME.into(), shape: shape.name.clone(), what, cure: cure.into() })
     };
-    let Some(texture) = shape.volume("volume") else {
-        return refuse(format!("shader {:?} without a volume", shape.state.shader), "use a shader that reads a volume");
+    let shader = &shape.state.shader;
+    let (count, of) = match (shape.volume("volume"), shape.attribute("scalars")) {
+        (Some(texture), _) => (texture.volume().desc().components, "a volume"),
+        (None, Some(scalars)) => (scalars.components, "an attribute"),
+        _ => {
+            let cure = "use a shader that reads a volume or an attribute";
+            return refuse(format!("shader {shader:?} without a volume or an attribute"), cure);
+        }
     };
-    if shape.block().is_none() {
-        return refuse(format!("geometry {:?}", shape.state.geometry.name()), "use a block");
-    }
-    let (count, component) = (texture.volume().desc().components, shape.int("component").unwrap_or(0));
+    let component = shape.int("component").unwrap_or(0);
     if component >= count as i64 {
-        return refuse(format!("component {component} of a volume that has {count}"), "name a component that is there");
+        return refuse(format!("component {component} of {of} that has {count}"), "name a component that is there");
+    }
+    if shape.attribute("scalars").is_some() && shape.state.geometry.vertex_count().is_none() {
+        check_attributes(shape, &tessellate(shape)?)?;
     }
     match Medium::new(shape) {
         Some(_) => Ok(()),
-        None => refuse(format!("shader {:?}", shape.state.shader), "use simple, lut, mip, minip, average or xray"),
+        None => {
+            let cure = "use simple, lut, mip, minip, average, xray or attribute";
+            refuse(format!("shader {shader:?}"), cure)
+        }
     }
+}
+
+/// A shape's tetrahedra, checked.
+fn tessellate(shape: &ResolvedShape) -> Result<Tessellation, ActionError> {
+    let geometry = &shape.state.geometry;
+    let made = geometry.tessellate().and_then(|made| made.validate(geometry.name()).map(|()| made));
+    made.map_err(|source| ActionError::Geometry { shape: shape.name.clone(), source })
+}
+
+/// Refuses attributes that have not a number for each vertex.
+fn check_attributes(shape: &ResolvedShape, made: &Tessellation) -> Result<(), ActionError> {
+    let wanted = shape.state.geometry.vertex_count().unwrap_or(made.vertices.len());
+    for name in ["scalars", "opacity_scalars"] {
+        let Some(attribute) = shape.attribute(name).filter(|a| a.len() != wanted) else { continue };
+        let kind = ProblemKind::Mistyped {
+            found: format!("attribute {:?} of {} vertices", attribute.name, attribute.len()),
+            wanted: format!("one of {wanted}, the geometry's"),
+        };
+        let problems = vec![ParameterProblem { name: name.into(), kind }];
+        let (shape, shader) = (shape.name.clone(), shape.state.shader.clone());
+        return Err(ActionError::Parameters { shape, shader, problems });
+    }
+    Ok(())
 }
 
 /// Makes shapes ready, in the order in which they are drawn.
@@ -89,7 +128,7 @@ pub(super) fn prepare(shapes: &[ResolvedShape], options: &ReferenceOptions) -> R
             check_samples(shape, options.sample_distance)?;
         }
         let skip = exact && compositing == Compositing::Over;
-        let Some((body, center)) = grid_body(shape, &medium, skip) else { continue };
+        let Some((body, center)) = body(shape, &medium, skip)? else { continue };
         prepared.push(Prepared {
             id: shape.id,
             brightest: medium.brightest(),
@@ -105,11 +144,40 @@ pub(super) fn prepare(shapes: &[ResolvedShape], options: &ReferenceOptions) -> R
     Ok(prepared)
 }
 
-fn grid_body(shape: &ResolvedShape, medium: &Medium, skip: bool) -> Option<(Body, DVec3)> {
-    let (texture, block) = (shape.volume("volume")?.clone(), shape.block()?);
-    let grid = Grid::new(medium, &Voxels::new(&texture), skip);
+/// What holds a shape's fields, and its middle; `None` where it holds nothing.
+fn body(shape: &ResolvedShape, medium: &Medium, skip: bool) -> Result<Option<(Body, DVec3)>, ActionError> {
+    if let (Some(block), Some(texture)) = (shape.block(), shape.volume("volume")) {
+        return Ok(Some((Body::Grid(grid_body(texture, block, medium, skip)), block.center())));
+    }
+    let made = tessellate(shape)?;
+    let mesh = Mesh::new(&made);
+    let center = mesh.bounds().center();
+    if made.tetrahedra.is_empty() {
+        return Ok(None);
+    }
+    if let Some(scalars) = shape.attribute("scalars") {
+        check_attributes(shape, &made)?;
+        let carried = Carried::numbers(medium, made.vertices.len(), scalars, shape.attribute("opacity_scalars"));
+        return Ok(Some((Body::Cells(Cells { mesh, carried }), center)));
+    }
+    let Some(texture) = shape.volume("volume") else { return Ok(None) };
+    Ok(Some(match &made.texture_coordinates {
+        Some(coordinates) => {
+            let grid = Grid::new(medium, &Voxels::new(texture), skip);
+            let carried = Carried::volume(texture.clone(), grid, coordinates.iter());
+            (Body::Cells(Cells { mesh, carried }), center)
+        }
+        None => {
+            let block = texture.geometry_roi();
+            (Body::Carved(mesh, grid_body(texture, block, medium, skip)), center)
+        }
+    }))
+}
+
+fn grid_body(texture: &VolumeTexture, block: Aabb, medium: &Medium, skip: bool) -> GridBody {
+    let grid = Grid::new(medium, &Voxels::new(texture), skip);
     let place = Place { to_index: texture.object_to_index(), block };
-    Some((Body::Grid(GridBody { texture, grid, place }), block.center()))
+    GridBody { texture: texture.clone(), grid, place }
 }
 
 fn check_samples(shape: &ResolvedShape, step: f64) -> Result<(), ActionError> {

@@ -14,9 +14,10 @@ use volact_core::{
 };
 
 use super::{
+    carried::{self, Cells, Part},
     flat::{self, Gather},
     lattice::{self, Counting},
-    line::{EPS, Line, Lines},
+    line::{EPS, Lines},
     march::{Light, March},
     mark::{Mark, Stretches},
     medium::Voxels,
@@ -26,6 +27,10 @@ use super::{
     prepare::{Body, GridBody, Prepared, prepare},
     sight::Sight,
 };
+
+/// Stretches of a mesh that are no further apart than this part of the distances on the ray are
+/// one to a lattice.
+const GAP: f64 = 1e-13;
 
 /// All that is drawn, and for whom.
 pub(super) struct Scene<'a> {
@@ -58,6 +63,16 @@ struct Met<'a> {
 enum Way<'a> {
     /// Along stretches of a block.
     Grid(&'a GridBody, Lines),
+    /// Through tetrahedra.
+    Cells(&'a Cells, carried::Way),
+}
+
+/// Where a part of a way begins.
+#[derive(Clone, Copy)]
+struct Start {
+    t: f64,
+    mark: Mark,
+    dt: f64,
 }
 
 /// What rounding leaves open.
@@ -146,12 +161,20 @@ impl<'a> Scene<'a> {
     fn meet<'s>(&'s self, shape: &'s Prepared, ray: &Ray, seen: &Stretches) -> Option<Met<'s>> {
         let sight = Sight::new(ray, &shape.to_object, shape.center)?;
         let mut stretches = seen.clone();
+        sight.clip(&shape.clip, &self.frame.clip, &mut stretches);
+        // A lattice's segments are not cut where rounding parts tetrahedra.
+        let gap = if self.options.method == Method::Exact { 0.0 } else { GAP };
         let way = match &shape.body {
             Body::Grid(body) => {
                 body.place.crop(&sight, &mut stretches);
-                sight.clip(&shape.clip, &self.frame.clip, &mut stretches);
                 Way::Grid(body, body.place.lines(&sight, &stretches))
             }
+            Body::Carved(mesh, body) => {
+                body.place.crop(&sight, &mut stretches);
+                let inside = mesh.trace(&sight).stretches(gap).meet(&stretches);
+                Way::Grid(body, body.place.lines(&sight, &inside))
+            }
+            Body::Cells(cells) => Way::Cells(cells, cells.meet(&shape.medium, &sight, gap, &stretches)),
         };
         Some(Met { shape, anchor: sight.anchor, way })
     }
@@ -179,6 +202,12 @@ impl<'a> Scene<'a> {
                     };
                 }
             }
+            Way::Cells(cells, way) => {
+                samples += match &counting {
+                    None => way.gather(&mut gathered, cells, &shape.medium),
+                    Some(counting) => way.gather_samples(&mut gathered, cells, &shape.medium, counting, ends),
+                };
+            }
         }
         (gathered.light(shape.compositing, &shape.medium), samples)
     }
@@ -188,8 +217,10 @@ impl<'a> Scene<'a> {
         let counting = self.counting(ray);
         let zero = shapes[0].anchor;
         let mut march = March::new(f64::from(self.frame.depth_threshold), brightest);
-        if let [met] = shapes {
-            self.pieces(met, counting.as_ref(), cutter, |piece, _| march.advance(std::slice::from_ref(piece)));
+        if let [met] = shapes
+            && met.track_count() == 1
+        {
+            self.pieces(met, 0, counting.as_ref(), cutter, |piece, _| march.advance(std::slice::from_ref(piece)));
         } else {
             let (tracks, snap) = self.tracks(shapes, zero, counting.as_ref(), cutter);
             overlap::sweep(&tracks, snap, |pieces| march.advance(pieces));
@@ -200,14 +231,15 @@ impl<'a> Scene<'a> {
         (light, samples)
     }
 
-    /// Visits a shape's pieces in order, each with the stretch that it is of, until `visit` says
-    /// false.
+    /// Visits the pieces of one of a shape's tracks in order, each with the start of what it is a
+    /// piece of, until `visit` says false.
     fn pieces(
         &self,
         met: &Met<'_>,
+        track: usize,
         counting: Option<&Counting>,
         cutter: &mut Cutter,
-        mut visit: impl FnMut(&Piece, &Line) -> bool,
+        mut visit: impl FnMut(&Piece, Start) -> bool,
     ) {
         let medium = &met.shape.medium;
         let post = self.options.classification == Classification::Post;
@@ -216,8 +248,9 @@ impl<'a> Scene<'a> {
             Way::Grid(body, met) => {
                 let voxels = Voxels::new(&body.texture);
                 for line in &met.lines {
+                    let start = Start { t: line.t[0], mark: line.ends[0], dt: line.dt };
                     let mut visit = |piece: &Piece| {
-                        goes_on = visit(piece, line);
+                        goes_on = visit(piece, start);
                         goes_on
                     };
                     match counting {
@@ -228,6 +261,17 @@ impl<'a> Scene<'a> {
                     if !goes_on {
                         return;
                     }
+                }
+            }
+            Way::Cells(cells, way) => {
+                let track = &way.tracks[track];
+                let start = |part: &Part| Start { t: part.t[0], mark: part.ends[0], dt: part.dt };
+                match (counting, track.first().map(start)) {
+                    (None, _) => way.pieces(track, cells, medium, cutter, |piece, part| visit(piece, start(part))),
+                    (Some(counting), Some(first)) => {
+                        way.samples(track, cells, medium, (counting, !post), cutter, |piece| visit(piece, first));
+                    }
+                    _ => {}
                 }
             }
         }
@@ -248,14 +292,16 @@ impl<'a> Scene<'a> {
         for met in shapes {
             let shift = met.anchor - zero;
             let around = 8.0 * EPS * (met.anchor.abs() + zero.abs() + shift.abs());
-            let mut track = Track::new();
-            self.pieces(met, counting, cutter, |piece, line| {
-                snap = snap.max(2.0 * line.dt + around);
-                let entry = (piece.t[0] == line.t[0]).then(|| number_of(&mut starts, line.ends[0]));
-                track.push(Piece { t: piece.t.map(|t| t + shift), entry, ..*piece });
-                true
-            });
-            tracks.push(track);
+            for number in 0..met.track_count() {
+                let mut track = Track::new();
+                self.pieces(met, number, counting, cutter, |piece, start| {
+                    snap = snap.max(2.0 * start.dt + around);
+                    let entry = (piece.t[0] == start.t).then(|| number_of(&mut starts, start.mark));
+                    track.push(Piece { t: piece.t.map(|t| t + shift), entry, ..*piece });
+                    true
+                });
+                tracks.push(track);
+            }
         }
         (tracks, snap)
     }
@@ -275,6 +321,15 @@ impl Met<'_> {
     fn is_through(&self) -> bool {
         match &self.way {
             Way::Grid(_, met) => !met.lines.is_empty(),
+            Way::Cells(_, way) => !way.tracks.is_empty(),
+        }
+    }
+
+    /// Tracks whose pieces may overlap.
+    fn track_count(&self) -> usize {
+        match &self.way {
+            Way::Grid(..) => 1,
+            Way::Cells(_, way) => way.tracks.len(),
         }
     }
 
@@ -282,6 +337,7 @@ impl Met<'_> {
     fn grazed(&self) -> f64 {
         match &self.way {
             Way::Grid(_, met) => met.grazed,
+            Way::Cells(_, way) => way.grazed,
         }
     }
 }

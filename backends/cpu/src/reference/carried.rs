@@ -1,0 +1,352 @@
+//! What the tetrahedra of a mesh carry: numbers of its vertices, or a volume through texture
+//! coordinates. Both are linear in a tetrahedron.
+//!
+//! Numbers give a field that is linear along a crossing. Texture coordinates give the ray a
+//! straight way through the volume's samples, another one in each tetrahedron; where it leaves
+//! the volume, the crossing is cut.
+//!
+//! # What is wrong with a crossing's numbers
+//! Barycentric weights are wrong by next to nothing ([`tetra`](super::tetra)); interpolation by
+//! a few roundings; and where t₀ and t₁ are rounded, the field moves by its change over the
+//! crossing times that over t₁ − t₀. It never leaves the range of its corners.
+
+use volact_core::{Attribute, VolumeTexture, glam::DVec3};
+
+use super::{
+    cells::Grid,
+    dd::Dd,
+    line::{EPS, Line},
+    mark::{Mark, Stretches},
+    medium::{Medium, Source, tame_infinities},
+    mesh::{Crossing, Mesh, Step, Trace, restrict},
+    piece::{Kind, Linear, Piece, Stretch},
+    sight::Sight,
+};
+
+/// Sample coordinates known worse than this are not looked at.
+const VAGUE: f64 = 1e-3;
+
+/// What a mesh carries.
+#[derive(Clone, Debug)]
+pub(super) enum Carried {
+    /// Numbers at the vertices, one list for each field of the medium.
+    Numbers(Vec<Vec<f64>>),
+    /// A volume, by texture coordinates of the vertices.
+    Volume(Volume),
+}
+
+/// A volume that is carried by a mesh.
+#[derive(Clone, Debug)]
+pub(super) struct Volume {
+    pub texture: VolumeTexture,
+    pub grid: Grid,
+    /// Of the vertices, 0 to 1 over the data ROI.
+    coordinates: Vec<DVec3>,
+}
+
+/// A mesh with what it carries.
+#[derive(Clone, Debug)]
+pub(super) struct Cells {
+    pub mesh: Mesh,
+    pub carried: Carried,
+}
+
+/// How a ray goes through a mesh.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Way {
+    /// Parts that do not overlap, in order; several where cells overlap.
+    pub tracks: Vec<Vec<Part>>,
+    /// The stretches inside the mesh.
+    pub stretches: Vec<[f64; 2]>,
+    /// The length of what is so short that rounding decides what it shows.
+    pub grazed: f64,
+    /// The ray's `t` from which `t` is counted.
+    pub anchor: f64,
+}
+
+/// A part of a crossing.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Part {
+    pub t: [f64; 2],
+    /// Where it begins and ends on the ray.
+    pub ends: [Mark; 2],
+    /// Whether the places of the ends matter.
+    pub loose: [bool; 2],
+    /// Bound on the error of the ends.
+    pub dt: f64,
+    /// The highest opacity of what may hide at its beginning.
+    hidden: f64,
+    pub what: What,
+}
+
+/// What a part is made of.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum What {
+    /// Fields that are linear along it.
+    Numbers([Linear; 4]),
+    /// A line through the samples of a volume.
+    Volume(Line),
+}
+
+impl Carried {
+    /// Numbers of `count` vertices for the fields of a medium. Vertices beyond the attribute's,
+    /// which are a tessellation's own, have none.
+    pub fn numbers(medium: &Medium, count: usize, scalars: &Attribute, opacity_scalars: Option<&Attribute>) -> Self {
+        let list = |source| {
+            let (attribute, component) = match source {
+                Source::OpacityScalars => (opacity_scalars.unwrap_or(scalars), 0),
+                Source::Scalars(c) | Source::Component(c) | Source::Classified(c) => (scalars, c),
+            };
+            (0..count).map(|v| attribute.value(v, component)).collect()
+        };
+        Self::Numbers(medium.fields.iter().map(|f| list(f.source)).collect())
+    }
+
+    /// A volume with texture coordinates for the vertices.
+    pub fn volume(texture: VolumeTexture, grid: Grid, coordinates: impl Iterator<Item = DVec3>) -> Self {
+        Self::Volume(Volume { texture, grid, coordinates: coordinates.collect() })
+    }
+
+    /// Whether what lies at the end of one crossing is what lies at the beginning of another.
+    fn goes_on(&self, from: &Crossing, to: &Crossing) -> bool {
+        let near = |a: f64, b: f64, size: f64| (a - b).abs() <= 64.0 * EPS * size;
+        match self {
+            Self::Numbers(fields) => fields.iter().all(|list| {
+                let (a, b) = (corners(list, from), corners(list, to));
+                let size = a.iter().chain(&b).fold(0.0, |m: f64, v| m.max(v.abs()));
+                near(from.values(&a)[1], to.values(&b)[0], size)
+            }),
+            Self::Volume(volume) => (0..3).all(|a| {
+                let [from, to] = [from, to].map(|c| volume.along(c, a));
+                near(from.ends[1], to.ends[0], from.size.max(to.size))
+            }),
+        }
+    }
+
+    /// Whether anything changes on a crossing.
+    fn changes(&self, crossing: &Crossing) -> bool {
+        match self {
+            Self::Numbers(fields) => fields.iter().any(|list| {
+                let corners = corners(list, crossing);
+                let [a, b] = crossing.values(&corners);
+                (a - b).abs() > 64.0 * EPS * corners.iter().fold(0.0, |m: f64, v| m.max(v.abs()))
+            }),
+            Self::Volume(volume) => (0..3).any(|a| {
+                let along = volume.along(crossing, a);
+                (along.ends[0] - along.ends[1]).abs() > 1e-9
+            }),
+        }
+    }
+
+    /// The highest opacity that a crossing may show.
+    fn opacity(&self, medium: &Medium, crossing: &Crossing) -> f64 {
+        let of_field = |(i, list): (usize, &Vec<f64>)| {
+            let [a, b] = crossing.values(&corners(list, crossing));
+            let field = &medium.fields[i];
+            let known = field.drives[3] && !a.is_nan() && !b.is_nan();
+            known.then(|| field.knots.bounds(a.min(b), a.max(b))[3][1])
+        };
+        match self {
+            Self::Numbers(fields) => fields.iter().enumerate().find_map(of_field).unwrap_or(0.0),
+            Self::Volume(_) => medium.max_opacity(),
+        }
+    }
+}
+
+fn corners(list: &[f64], crossing: &Crossing) -> [f64; 4] {
+    crossing.corners.map(|v| list[v as usize])
+}
+
+impl Cells {
+    /// How a ray goes through what `left` holds of the mesh; see [`Trace::stretches`] for `gap`.
+    pub fn meet(&self, medium: &Medium, sight: &Sight, gap: f64, left: &Stretches) -> Way {
+        let trace = self.mesh.trace(sight);
+        let stretches = trace.stretches(gap).meet(left);
+        let inside = stretches.as_slice().iter().map(|s| s.map(|m| m.from(trace.anchor)));
+        let mut way = Way { anchor: trace.anchor, stretches: inside.collect(), ..Way::default() };
+        let goes_on = |a: &Crossing, b: &Crossing| self.carried.goes_on(a, b);
+        for track in trace.tracks(goes_on, |c| self.carried.changes(c)) {
+            let mut parts = Vec::new();
+            for step in restrict(&track, &stretches, trace.anchor) {
+                let hidden = step.hidden.map_or(0.0, |h| self.carried.opacity(medium, &trace.crossings[h]));
+                match self.part(medium, &trace, &step) {
+                    Some(part) => parts.push(Part { hidden, ..part }),
+                    None if self.is_vague(&trace, &step) => way.grazed += step.t[1] - step.t[0] + 2.0 * trace.dt,
+                    None => {}
+                }
+            }
+            way.tracks.push(parts);
+        }
+        way.tracks.retain(|parts| !parts.is_empty());
+        way
+    }
+
+    fn part(&self, medium: &Medium, trace: &Trace, step: &Step) -> Option<Part> {
+        let crossing = &trace.crossings[step.crossing];
+        let made = Part {
+            t: step.t,
+            ends: step.ends,
+            loose: step.loose,
+            dt: trace.dt,
+            hidden: 0.0,
+            what: What::Numbers([Linear { values: [0.0; 2], range: [0.0; 2], error: 0.0 }; 4]),
+        };
+        match &self.carried {
+            Carried::Numbers(fields) => {
+                let mut linear = [Linear { values: [0.0; 2], range: [0.0; 2], error: 0.0 }; 4];
+                for (linear, list) in linear.iter_mut().zip(fields).take(medium.fields.len()) {
+                    *linear = numbers(trace, crossing, step, corners(list, crossing))?;
+                }
+                Some(Part { what: What::Numbers(linear), ..made })
+            }
+            Carried::Volume(volume) => volume.part(trace, crossing, made),
+        }
+    }
+
+    /// Whether a step is so short that its way through a volume is not known.
+    fn is_vague(&self, trace: &Trace, step: &Step) -> bool {
+        let crossing = &trace.crossings[step.crossing];
+        match &self.carried {
+            Carried::Numbers(_) => false,
+            Carried::Volume(volume) => !volume.line(trace, crossing, step.ends, step.t).is_sharp(),
+        }
+    }
+}
+
+/// A field along a step, from its numbers at the corners; `None` where one is NaN.
+fn numbers(trace: &Trace, crossing: &Crossing, step: &Step, mut corners: [f64; 4]) -> Option<Linear> {
+    if corners.iter().any(|v| v.is_nan()) {
+        return None;
+    }
+    tame_infinities(&mut corners)?;
+    let range = corners.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], &v| [a.min(v), b.max(v)]);
+    if range[0] == range[1] {
+        return Some(Linear { values: range, range, error: 0.0 });
+    }
+    let ends = crossing.values(&corners);
+    let full = crossing.t[1] - crossing.t[0];
+    let at = |t: f64| {
+        let part = ((t - crossing.t[0]) / full).clamp(0.0, 1.0);
+        (ends[0] + (ends[1] - ends[0]) * part).clamp(range[0], range[1])
+    };
+    let (spread, most) = (range[1] - range[0], range[0].abs().max(range[1].abs()));
+    let moved = (ends[1] - ends[0]).abs() * (16.0 * EPS * trace.reach / full).min(1.0);
+    let error = 2.0 * crossing.loose() * spread + 16.0 * EPS * spread + 4.0 * EPS * most + moved;
+    let values = step.t.map(|t| if t == crossing.t[1] { ends[1] } else { at(t) });
+    Some(Linear { values, range, error: error.min(spread) })
+}
+
+/// A texture coordinate along a crossing.
+struct Along {
+    /// Where the ray comes in and goes out.
+    ends: [f64; 2],
+    /// Lowest and highest at the corners.
+    range: [f64; 2],
+    /// The largest magnitude.
+    size: f64,
+}
+
+impl Volume {
+    fn along(&self, crossing: &Crossing, axis: usize) -> Along {
+        let corners = crossing.corners.map(|v| self.coordinates[v as usize][axis]);
+        let range = corners.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], &v| [a.min(v), b.max(v)]);
+        Along { ends: crossing.values(&corners), range, size: range[0].abs().max(range[1].abs()) }
+    }
+
+    fn part(&self, trace: &Trace, crossing: &Crossing, made: Part) -> Option<Part> {
+        let mut made = made;
+        for axis in 0..3 {
+            let along = self.along(crossing, axis);
+            if along.range[0] < 0.0 || along.range[1] > 1.0 {
+                made = cut(trace, crossing, &along, made)?;
+            }
+        }
+        let line = self.line(trace, crossing, made.ends, made.t);
+        line.is_sharp().then_some(Part { what: What::Volume(Line { dt: made.dt, ..line }), ..made })
+    }
+
+    /// The way through the samples.
+    fn line(&self, trace: &Trace, crossing: &Crossing, ends: [Mark; 2], t: [f64; 2]) -> Line {
+        let roi = self.texture.data_roi();
+        let full = crossing.t[1] - crossing.t[0];
+        let mut line = Line {
+            anchor: trace.anchor,
+            t,
+            ends,
+            dt: trace.dt,
+            index: [Dd::default(); 3],
+            step: [0.0; 3],
+            dp: [0.0; 3],
+        };
+        for axis in 0..3 {
+            let along = self.along(crossing, axis);
+            let (low, count) = (roi.min[axis] as f64, (roi.max[axis] - roi.min[axis]) as f64);
+            let index = |c: f64| Dd::product(c, count).add(Dd::new(low));
+            let [a, b] = along.ends;
+            let step = if along.range[0] == along.range[1] { 0.0 } else { (b - a) * count / full };
+            line.step[axis] = step;
+            line.index[axis] = index(a).add(Dd::product(-crossing.t[0], step));
+            if along.range[0] < along.range[1] {
+                let round = 16.0 * EPS * (trace.reach * step.abs() + 1.0 + count * along.size);
+                let spread = (along.range[1] - along.range[0]) * count;
+                line.dp[axis] = round + 2.0 * crossing.loose() * spread;
+            }
+        }
+        line
+    }
+}
+
+impl Line {
+    /// Whether positions are known well.
+    fn is_sharp(&self) -> bool {
+        self.dp.iter().all(|&d| d <= VAGUE)
+    }
+}
+
+/// Cuts a part to where a texture coordinate is between 0 and 1.
+fn cut(trace: &Trace, crossing: &Crossing, along: &Along, part: Part) -> Option<Part> {
+    let [a, b] = along.ends;
+    let [t0, t1] = crossing.t;
+    let slope = (b - a) / (t1 - t0);
+    if a == b || !slope.is_normal() {
+        return (0.0..=1.0).contains(&a).then_some(part);
+    }
+    let wrong = 8.0 * EPS * along.size + 2.0 * crossing.loose() * (along.range[1] - along.range[0]);
+    let error = wrong / slope.abs() + 4.0 * EPS * trace.reach;
+    let at = |c: f64| t0 + (c - a) / slope;
+    let (enter, leave) = if slope > 0.0 { (at(0.0), at(1.0)) } else { (at(1.0), at(0.0)) };
+    let mut made = part;
+    let mark = |t: f64| Mark::rough(trace.anchor + t, error + 2.0 * EPS * trace.anchor.abs());
+    if enter > made.t[0] {
+        (made.t[0], made.ends[0], made.loose[0]) = (enter, mark(enter), true);
+        made.dt = made.dt.max(error);
+    }
+    if leave < made.t[1] {
+        (made.t[1], made.ends[1], made.loose[1]) = (leave, mark(leave), true);
+        made.dt = made.dt.max(error);
+    }
+    (made.t[0] < made.t[1]).then_some(made)
+}
+
+impl Part {
+    /// For pieces of linear fields.
+    pub fn stretch(&self) -> Stretch {
+        Stretch { t: self.t, dt: self.dt, loose: self.loose, apart: false }
+    }
+
+    /// Has the first of its pieces cover what may hide before it: over a length within the error
+    /// of places, of that opacity and any colour.
+    pub fn cover(&self, piece: &mut Piece, brightest: f64) {
+        if self.hidden <= 0.0 || piece.t[0] != self.t[0] {
+            return;
+        }
+        let depth = -(-self.hidden.min(1.0)).ln_1p() * 8.0 * self.dt;
+        if let Kind::Opaque { .. } = piece.kind {
+            piece.color_error += brightest * (depth / piece.unit).min(1.0);
+        } else {
+            let spread = 2.0 * depth / (piece.t[1] - piece.t[0]);
+            piece.edge += spread;
+            piece.edge_color += spread * brightest;
+        }
+    }
+}
