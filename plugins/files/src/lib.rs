@@ -13,6 +13,7 @@
 
 mod dicom;
 mod elements;
+mod exodus;
 mod fields;
 mod format;
 mod mesh;
@@ -68,6 +69,7 @@ fn formats() -> Vec<Format> {
         vts::format(),
         vtp::format(),
         plot3d::format(),
+        exodus::format(),
         obj::format(),
         ply::format(),
         stl::format(),
@@ -76,8 +78,7 @@ fn formats() -> Vec<Format> {
 }
 
 /// All loaders of this crate: of volumes nrrd, metaimage, nifti, dicom, tiff, png, vtk, vti and raw,
-/// of meshes vtk-mesh, vtu, vts, vtp, plot3d, obj, ply and
-/// stl.
+/// of meshes vtk-mesh, vtu, vts, vtp, plot3d, exodus, obj, ply and stl.
 pub fn loaders() -> Vec<Arc<dyn Loader>> {
     formats().into_iter().map(|format| Arc::new(format) as Arc<dyn Loader>).collect()
 }

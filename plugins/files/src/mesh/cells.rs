@@ -150,6 +150,16 @@ pub(crate) fn codes(path: &Path, types: &Numbers) -> Result<Buffer, LoadError> {
     Ok(Buffer::from_vec(codes?))
 }
 
+/// A mesh of cells of the types given, of which there is at least one.
+pub(crate) fn mesh_of(path: &Path, points: Points, types: Buffer, connectivity: Buffer) -> Result<Mesh, LoadError> {
+    let first = types.bytes().first().copied().unwrap_or(0);
+    let types = match CellType::from_code(first).filter(|_| types.bytes().iter().all(|t| *t == first)) {
+        Some(all) => CellTypes::All(all),
+        None => CellTypes::Each(types),
+    };
+    Mesh::new(points, types, connectivity).map_err(|source| LoadError::geometry(path, source))
+}
+
 impl CellArrays {
     /// The first cell that has a vertex, in words.
     pub(crate) fn owner(&self, vertex: usize) -> String {
@@ -271,12 +281,7 @@ impl<'a> Cells<'a> {
             let what = format!("number of cells that hold volume (of {})", self.seen);
             return Err(LoadError::invalid(self.path, what, 0, "at least 1"));
         }
-        let first = types.bytes()[0];
-        let types = match CellType::from_code(first).filter(|_| types.bytes().iter().all(|t| *t == first)) {
-            Some(all) => CellTypes::All(all),
-            None => CellTypes::Each(types),
-        };
-        Mesh::new(points, types, connectivity).map_err(|source| LoadError::geometry(self.path, source))
+        mesh_of(self.path, points, types, connectivity)
     }
 
     fn name(&self, cell: usize) -> String {

@@ -13,7 +13,7 @@ use volact_core::{LoadError, Progress, Warning, WarningCode};
 use crate::storage::Storage;
 
 pub(crate) use attributes::{Attributes, Named, merge};
-pub(crate) use cells::{CellArrays, CellLayout, Cells, codes};
+pub(crate) use cells::{CellArrays, CellLayout, Cells, codes, mesh_of};
 pub(crate) use structured::{Blanking, GHOST_CELL, GHOSTS, HIDDEN_POINT, flags, hexahedra, structured};
 pub(crate) use surface::Triangles;
 pub(crate) use vertices::{Joined, check_count, finite_points};

@@ -72,7 +72,9 @@ pub(crate) fn format() -> Format {
 fn probe(probe: &Probe<'_>) -> Confidence {
     let name = probe.file_name();
     let binary = probe.head.iter().take(16).any(|b| *b < 9);
-    let named = EXTENSIONS.iter().any(|e| name.ends_with(e));
+    // Exodus II shares an extension.
+    let netcdf = probe.head.starts_with(b"CDF") || probe.head.starts_with(b"\x89HDF");
+    let named = !netcdf && EXTENSIONS.iter().any(|e| name.ends_with(e));
     if named && binary && !probe.is_dir { Confidence::Extension } else { Confidence::No }
 }
 
