@@ -6,6 +6,8 @@
 #[path = "reference/common.rs"]
 mod common;
 
+#[path = "reference/clips.rs"]
+mod clips;
 #[path = "reference/closed_forms.rs"]
 mod closed_forms;
 #[path = "reference/cubic_cells.rs"]
@@ -18,5 +20,11 @@ mod invariance;
 mod lattice;
 #[path = "reference/life.rs"]
 mod life;
+#[path = "reference/opaque.rs"]
+mod opaque;
+#[path = "reference/slices.rs"]
+mod slices;
 #[path = "reference/speed.rs"]
 mod speed;
+#[path = "reference/surfaces.rs"]
+mod surfaces;

@@ -7,6 +7,8 @@
 //! A stretch on which the series do not converge is halved. Halving towards a zero of 1 − a (a
 //! peak that touches 1) shrinks geometrically; the last bit is bounded by Remez's inequality.
 
+mod meet;
+
 use super::{
     border::log_bound,
     cubic,
@@ -40,6 +42,8 @@ pub(super) struct March {
     threshold: f64,
     depth: f64,
     brightest: f64,
+    /// The lowest number of any colour: below 0 only where the application's is.
+    darkest: f64,
     terms: Vec<Term>,
     /// Stretches evaluated.
     pub stretches: u64,
@@ -60,8 +64,8 @@ impl Light {
 }
 
 impl March {
-    /// A ray whose depth is taken at an accumulated opacity, through media of that brightness.
-    pub fn new(depth_threshold: f64, brightest: f64) -> Self {
+    /// A ray whose depth is taken at an accumulated opacity, through colours between these.
+    pub fn new(depth_threshold: f64, [darkest, brightest]: [f64; 2]) -> Self {
         Self {
             t: [1.0; 2],
             likely: 1.0,
@@ -73,6 +77,7 @@ impl March {
             threshold: 1.0 - depth_threshold,
             depth: f64::INFINITY,
             brightest,
+            darkest,
             terms: Vec::new(),
             stretches: 0,
         }
@@ -108,7 +113,7 @@ impl March {
         let dark = if self.t[1] <= DARK { self.t[1] * self.brightest } else { 0.0 };
         for c in 0..3 {
             let wrong = self.error[c] * (1.0 + 1e-3) + 8.0 * EPS * self.d[c].abs();
-            light.lower[c] = (self.d[c] - wrong).max(0.0);
+            light.lower[c] = (self.d[c] - wrong - if self.darkest < 0.0 { dark } else { 0.0 }).max(self.darkest);
             light.upper[c] = (self.d[c] + wrong + dark).min(self.brightest);
         }
         let absorbed_less = if self.t[1] <= DARK { 0.0 } else { self.t[0] };
@@ -171,7 +176,9 @@ impl March {
         let factor = (-depth).exp();
         let wrong = (if error < 1.0 { error + error * error } else { f64::INFINITY }) + 8.0 * EPS;
         let lowest = if wrong < 1.0 { factor * (1.0 - wrong) } else { 0.0 };
-        self.t = [self.t[0] * lowest, (self.t[1] * (factor * (1.0 + wrong)).min(1.0))];
+        // A depth far beyond its error leaves nothing, however large the error.
+        let highest = if error < 1.0 { factor * (1.0 + wrong) } else { (error - depth).exp() * (1.0 + 8.0 * EPS) };
+        self.t = [self.t[0] * lowest, self.t[1] * highest.min(1.0)];
         self.likely *= factor;
     }
 
@@ -284,30 +291,37 @@ impl March {
         }
     }
 
-    /// Bounds a stretch that is too short to be halved again; `false` if it is not.
+    /// Bounds a stretch that is too short to be halved again, or so dense that the errors of opacity
+    /// alone are depths; `false` if it is neither.
     fn last_bit(&mut self, pieces: &[Piece], [a, b]: [f64; 2]) -> bool {
         let width = b - a;
-        if width > 0.25 {
-            return false;
-        }
-        let (mut depth, mut others) = (0.0, 0.0);
+        let (mut depth, mut others, mut least, mut noise) = (0.0, 0.0, 0.0, 0.0);
         let (mut worst, mut chosen) = (-1.0, pieces[0]);
-        let mut hopeless = true;
+        let (mut hopeless, mut nothing) = (true, true);
         for p in pieces.iter().filter(|p| p.kind == Kind::Smooth) {
             let rest = |y: f64| cubic::eval(&p.rest, y);
             let wrong = p.opacity_error + 16.0 * EPS * p.rest.iter().map(|v| v.abs()).sum::<f64>();
             let most = rest(-1.0).max(rest(0.0)).max(rest(1.0)) - wrong;
             let bound = log_bound(width, most * p.ratio) - width * p.floor.ln();
-            let own = 0.5 * (p.t[1] - p.t[0]) / p.unit * bound;
+            let scale = 0.5 * (p.t[1] - p.t[0]) / p.unit;
+            let own = scale * bound;
             depth += own;
             others += if own > worst { worst.max(0.0) } else { own };
             if own > worst {
                 (worst, chosen) = (own, *p);
             }
-            let here = rest(a).max(rest(b)).max(rest(0.5 * (a + b)));
-            hopeless &= here <= 4.0 * wrong;
+            let here = cubic::restrict(&p.rest, 0.5 * (a + b), 0.5 * width);
+            let highest = here[0] + variation(&here) + wrong;
+            least += scale * width * -highest.clamp(f64::MIN_POSITIVE, 1.0).ln();
+            noise += scale * width * wrong;
+            hopeless &= rest(a).max(rest(b)).max(here[0]) <= 4.0 * wrong;
+            nothing &= here[0] - variation(&here) >= 1.0 - 4.0 * wrong;
         }
-        if depth > REST && width > 1e-14 && !hopeless {
+        let moved = chosen.color.map(|c| variation(&cubic::restrict(&c, 0.5 * (a + b), 0.5 * width)));
+        let moved = moved.into_iter().fold(0.0, f64::max);
+        let short = width <= 0.25 && (depth <= REST || width <= 1e-14 || hopeless);
+        let gone = self.t[1] * (-least).exp() < DARK && self.t[1] * moved <= REST;
+        if !(short || (noise > 1.0 && (gone || nothing))) {
             return false;
         }
         let at = |y: f64| chosen.color.map(|c| cubic::eval(&c, y));
@@ -322,9 +336,9 @@ impl March {
         self.likely *= (-0.5 * depth).exp();
         // T lies in its interval all along, so by parts ∫ T dc is T's middle times the change of c
         // but for half the interval's width times the variation.
-        let moved = chosen.color.map(|c| variation(&cubic::restrict(&c, 0.5 * (a + b), 0.5 * width)));
-        self.add_error((self.t[1] - self.t[0]) * moved.into_iter().fold(0.0, f64::max));
+        self.add_error((self.t[1] - self.t[0]) * moved);
         self.jump(at(b));
+        self.t[1] = (self.t[1] * (-least).exp() * (1.0 + 8.0 * EPS)).min(1.0);
         true
     }
 

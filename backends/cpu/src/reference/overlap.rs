@@ -1,42 +1,103 @@
-//! Shapes that overlap: extinctions add, so the order of drawing means nothing.
+//! Shapes that overlap, and hits among them: extinctions add, so the order of drawing means
+//! nothing.
 //!
-//! The pieces of all shapes are cut to the stretches that they share. Ends that lie within
-//! rounding of each other are taken as one; what that moves is in the pieces' bounds.
+//! The pieces of all shapes are cut to the stretches that they share, and at hits. Ends that lie
+//! within rounding of each other are taken as one; what that moves is in the pieces' bounds.
 
 use super::{
     cubic,
+    hit::Hit,
     line::EPS,
+    march::March,
+    mark::Mark,
     piece::{Kind, Piece},
 };
 
 /// The pieces of one shape along a ray, in order.
 pub(super) type Track = Vec<Piece>;
 
-/// Visits all stretches between ends of pieces in order, with the pieces on them, until `visit`
-/// says false. `snap` is the distance within which ends are one.
-pub(super) fn sweep(tracks: &[Track], snap: f64, mut visit: impl FnMut(&[Piece]) -> bool) {
-    let mut next = vec![0usize; tracks.len()];
-    let mut active = Vec::with_capacity(tracks.len());
-    let mut at = f64::NEG_INFINITY;
-    loop {
-        skip_passed(tracks, &mut next, at + snap);
-        let heads = || tracks.iter().zip(&next).filter_map(|(track, &n)| track.get(n));
-        let Some(start) = heads().map(|p| p.t[0].max(at)).min_by(f64::total_cmp) else { return };
-        let ends = heads().map(|p| if p.t[0] > start + snap { p.t[0] } else { p.t[1] });
-        let Some(end) = ends.min_by(f64::total_cmp) else { return };
-        active.clear();
-        active.extend(heads().filter(|p| p.t[0] <= start + snap).map(|p| part(p, [start, end], snap)));
-        if !visit(&active) {
-            return;
+/// All that there is on a ray, with `t` counted from one zero.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Along {
+    pub tracks: Vec<Track>,
+    /// In order and apart, each with its `t`.
+    pub hits: Vec<(f64, Hit)>,
+    /// The places that pieces name as their entries.
+    pub starts: Vec<Mark>,
+    /// The distance within which ends are one.
+    pub snap: f64,
+}
+
+impl Along {
+    /// Adds hits in order, with `t` counted from `zero`.
+    pub fn add_hits(&mut self, hits: Vec<Hit>, zero: f64) {
+        for hit in hits {
+            let t = hit.mark.from(zero);
+            if t.is_finite() {
+                self.snap = self.snap.max(2.0 * (hit.mark.error + EPS * t.abs()));
+            }
+            self.hits.push((t, hit));
         }
-        at = end;
     }
 }
 
-fn skip_passed(tracks: &[Track], next: &mut [usize], at: f64) {
-    for (track, n) in tracks.iter().zip(next) {
-        while track.get(*n).is_some_and(|p| p.t[1] <= at) {
-            *n += 1;
+/// How far a sweep has come.
+struct Sweep<'a> {
+    along: &'a Along,
+    /// The piece of each track that is next.
+    next: Vec<usize>,
+    hit: usize,
+    /// The last stretch.
+    last: [f64; 2],
+}
+
+/// Marches over all stretches between ends of pieces in order, with the pieces on them, and over
+/// hits, until nothing behind can be seen.
+pub(super) fn sweep(along: &Along, march: &mut March) {
+    let next = vec![0; along.tracks.len()];
+    let mut at = Sweep { along, next, hit: 0, last: [f64::NEG_INFINITY; 2] };
+    let mut active = Vec::with_capacity(along.tracks.len());
+    while at.step(march, &mut active) {}
+}
+
+impl Sweep<'_> {
+    /// Goes over one stretch, or a hit in a gap; `false` at the end.
+    fn step(&mut self, march: &mut March, active: &mut Vec<Piece>) -> bool {
+        self.skip_passed(march);
+        let (snap, at) = (self.along.snap, self.last[1]);
+        let start = self.heads().map(|p| p.t[0].max(at)).min_by(f64::total_cmp);
+        active.clear();
+        if let Some((t, hit)) = self.along.hits.get(self.hit)
+            && start.is_none_or(|start| *t < start - snap)
+        {
+            self.hit += 1;
+            return march.meet(hit, *t, active, &self.along.starts);
+        }
+        let Some(start) = start else { return false };
+        let here = self.along.hits[self.hit..].iter().take_while(|(t, _)| *t <= start + snap).count();
+        let here = &self.along.hits[self.hit..self.hit + here];
+        self.hit += here.len();
+        let ends = self.heads().map(|p| if p.t[0] > start + snap { p.t[0] } else { p.t[1] });
+        let cut = self.along.hits.get(self.hit).map(|(t, _)| *t);
+        let Some(end) = ends.chain(cut).min_by(f64::total_cmp) else { return false };
+        active.extend(self.heads().filter(|p| p.t[0] <= start + snap).map(|p| part(p, [start, end], snap)));
+        self.last = [start, end];
+        here.iter().all(|(t, hit)| march.meet(hit, *t, active, &self.along.starts)) && march.advance(active)
+    }
+
+    fn heads(&self) -> impl Iterator<Item = &Piece> {
+        self.along.tracks.iter().zip(&self.next).filter_map(|(track, &n)| track.get(n))
+    }
+
+    fn skip_passed(&mut self, march: &mut March) {
+        let (snap, [start, end]) = (self.along.snap, self.last);
+        for (track, n) in self.along.tracks.iter().zip(&mut self.next) {
+            while let Some(p) = track.get(*n).filter(|p| p.t[1] <= end + snap) {
+                if p.t[0] > start + snap {
+                    march.skip(p);
+                }
+                *n += 1;
+            }
         }
     }
 }
@@ -57,7 +118,7 @@ fn part(p: &Piece, t: [f64; 2], snap: f64) -> Piece {
     made.opacity_error += moved(&p.rest);
     if p.kind == Kind::Smooth {
         let least = [-1.0, 0.0, 1.0].map(|y| cubic::eval(&made.rest, y)).into_iter().fold(1.0, f64::min);
-        let zone = (2.0 * snap / (t[1] - t[0])).min(2.0);
+        let zone = (4.0 * snap / (t[1] - t[0])).min(2.0);
         let log = if least > 1e-12 { -least.ln() + 0.7 } else { 3.0 * (8.0 / zone).ln() + 40.0 };
         made.edge = p.edge / half.max(1e-300) + zone * log;
         made.edge_color = p.edge_color / half.max(1e-300);

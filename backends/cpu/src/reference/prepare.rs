@@ -1,7 +1,7 @@
 //! Shapes checked and made ready.
 
 use volact_core::{
-    Aabb, ActionError, Clip, Compositing, Tessellation, VolumeTexture,
+    Aabb, ActionError, Clip, Compositing, Slices, Tessellation, VolumeTexture,
     glam::{DAffine3, DVec3},
     parameter::{ParameterProblem, ProblemKind},
     resolve::ResolvedShape,
@@ -14,6 +14,7 @@ use super::{
     medium::{Medium, Voxels},
     mesh::Mesh,
     options::{Method, NAME, ReferenceOptions},
+    surfaces,
 };
 
 /// A shape made ready.
@@ -30,6 +31,8 @@ pub(super) struct Prepared {
     /// What cuts it, in object space.
     pub clip: Clip,
     pub compositing: Compositing,
+    /// The planes on which it is drawn, where it is.
+    pub slices: Option<Slices>,
     /// The highest number of any colour channel.
     pub brightest: f64,
     /// The highest opacity.
@@ -66,6 +69,12 @@ pub fn check(shape: &ResolvedShape) -> Result<(), ActionError> {
         Err(ActionError::Unsupported { action: NAME.into(), shape: shape.name.clone(), what, cure: cure.into() })
     };
     let shader = &shape.state.shader;
+    if surfaces::is_surface(shape) {
+        return surfaces::check(shape);
+    }
+    if shape.state.geometry.slices().is_some() && shape.compositing() != Compositing::Over {
+        return refuse(format!("slices with the shader {shader:?}"), "use simple, lut or attribute");
+    }
     let (count, of) = match (shape.volume("volume"), shape.attribute("scalars")) {
         (Some(texture), _) => (texture.volume().desc().components, "a volume"),
         (None, Some(scalars)) => (scalars.components, "an attribute"),
@@ -113,14 +122,14 @@ fn check_attributes(shape: &ResolvedShape, made: &Tessellation) -> Result<(), Ac
     Ok(())
 }
 
-/// Makes shapes ready, in the order in which they are drawn.
+/// Makes shapes other than surfaces ready, in the order in which they are drawn. [`check`] has let
+/// them pass.
 ///
 /// # Errors
-/// If a shape is refused by [`check`], or a lattice is too fine.
+/// If a geometry cannot be tessellated, or a lattice is too fine.
 pub(super) fn prepare(shapes: &[ResolvedShape], options: &ReferenceOptions) -> Result<Vec<Prepared>, ActionError> {
     let mut prepared: Vec<Prepared> = Vec::new();
-    for shape in shapes {
-        check(shape)?;
+    for shape in shapes.iter().filter(|s| !surfaces::is_surface(s)) {
         let Some(medium) = Medium::new(shape) else { continue };
         let compositing = shape.compositing();
         let exact = options.method == Method::Exact;
@@ -139,6 +148,7 @@ pub(super) fn prepare(shapes: &[ResolvedShape], options: &ReferenceOptions) -> R
             center,
             clip: shape.state.clip.clone(),
             compositing,
+            slices: shape.state.geometry.slices().cloned(),
         });
     }
     Ok(prepared)

@@ -16,16 +16,18 @@ use volact_core::{
 use super::{
     carried::{self, Cells, Part},
     flat::{self, Gather},
+    hit::{self, Hit},
     lattice::{self, Counting},
     line::{EPS, Lines},
     march::{Light, March},
     mark::{Mark, Stretches},
     medium::Voxels,
     options::{Classification, Method, ReferenceOptions},
-    overlap::{self, Track},
+    overlap::{self, Along, Track},
     piece::{Cutter, Piece},
-    prepare::{Body, GridBody, Prepared, prepare},
+    prepare::{Body, GridBody, Prepared, check, prepare},
     sight::Sight,
+    slices, surfaces,
 };
 
 /// Stretches of a mesh that are no further apart than this part of the distances on the ray are
@@ -38,10 +40,13 @@ pub(super) struct Scene<'a> {
     options: &'a ReferenceOptions,
     /// In the order of drawing.
     shapes: Vec<Prepared>,
+    surfaces: Vec<surfaces::Prepared>,
     rays: RayGrid,
     viewport: Viewport,
     /// Where rays end, pixel by pixel, if something opaque was given.
     limits: Option<Vec<f64>>,
+    /// The highest number of any colour channel of anything.
+    brightest: f64,
 }
 
 /// What came of one ray.
@@ -97,7 +102,13 @@ impl<'a> Scene<'a> {
         let viewport = frame.viewport();
         let rays = frame.camera.rays(&viewport).map_err(FrameError::from)?;
         let limits = frame.opaque.as_ref().map(|o| o.limits(&rays, &viewport, frame.width));
-        Ok(Self { frame, options, shapes: prepare(shapes, options)?, rays, viewport, limits })
+        shapes.iter().try_for_each(check)?;
+        let mut surfaces: Vec<_> = shapes.iter().filter_map(surfaces::prepare).collect();
+        surfaces.sort_by_key(|s| s.id);
+        let shapes = prepare(shapes, options)?;
+        let colors = shapes.iter().map(|s| s.brightest).chain(surfaces.iter().map(|s| s.brightest()));
+        let brightest = colors.fold(1.0, f64::max);
+        Ok(Self { frame, options, shapes, surfaces, rays, viewport, limits, brightest })
     }
 
     /// All rows of the viewport, shared out to threads row by row.
@@ -128,37 +139,58 @@ impl<'a> Scene<'a> {
 
     fn pixel(&self, x: usize, y: usize, cutter: &mut Cutter) -> Pixel {
         let ray = self.rays.ray(x as f64 + 0.5, y as f64 + 0.5);
-        let limit = self.limits.as_ref().map_or(f64::INFINITY, |l| l[y * self.viewport.width + x]);
-        let seen = Stretches::between(Mark::exact(ray.near), Mark::exact(ray.far.min(limit)));
-        let brightest = self.shapes.iter().map(|s| s.brightest).fold(1.0, f64::max);
+        let (drawn, [darkest, brightest]) = self.drawn_by_application(x, y);
+        let range = [darkest, self.brightest + brightest];
         let mut pixel = Pixel { light: Light::NONE, samples: 0, met: false };
-        let mut doubt = Doubt::default();
+        let limit = drawn.map_or(f64::INFINITY, |d| d.mark.t.hi);
+        let mut seen = Stretches::between(Mark::exact(ray.near), Mark::exact(ray.far.min(limit)));
+        let mut hits = Vec::new();
+        self.surfaces.iter().for_each(|s| s.hits(&ray, &self.frame.clip, &seen, &mut hits));
+        // Surfaces end what lies behind them, also where it is a picture of its own.
+        let end = hits.iter().filter(|h| h.is_opaque()).map(|h| h.mark).min_by(Mark::order);
+        if let Some(end) = end {
+            seen.keep(Mark::exact(f64::NEG_INFINITY), end);
+        }
+        let open = hits.iter().any(|h| !h.is_opaque());
         let (mut over, mut flat) = (Vec::new(), Vec::new());
         for shape in &self.shapes {
-            let Some(met) = self.meet(shape, &ray, &seen) else { continue };
-            pixel.met |= met.is_through() || met.grazed() > 0.0;
-            doubt.add(&met, brightest);
-            if met.is_through() {
-                if shape.compositing == Compositing::Over { over.push(met) } else { flat.push(met) }
-            }
+            let Some(met) = self.meet(shape, &ray, &seen, &mut hits) else { continue };
+            if shape.compositing == Compositing::Over { over.push(met) } else { flat.push(met) }
         }
-        if !over.is_empty() {
-            over.sort_by_key(|m| m.shape.id);
-            let (light, samples) = self.over(&ray, &over, brightest, cutter);
-            (pixel.light, pixel.samples) = (light, samples);
+        over.sort_by_key(|m| m.shape.id);
+        let mut doubt = Doubt { whole: open && !flat.is_empty(), width: 0.0 };
+        over.iter().chain(&flat).for_each(|met| doubt.add(met, range[1]));
+        pixel.met = !(hits.is_empty() && over.is_empty() && flat.is_empty());
+        over.retain(Met::is_through);
+        hits.extend(drawn);
+        if !over.is_empty() || !hits.is_empty() {
+            (pixel.light, pixel.samples) = self.over(&ray, &over, hit::in_order(hits), range, cutter);
             pixel.light.depth -= ray.depth_zero;
         }
-        for met in &flat {
+        for met in flat.iter().filter(|m| m.is_through()) {
             let (light, samples) = self.flat(&ray, met);
             pixel.light = flat::over(&light, &pixel.light);
             pixel.samples += samples;
         }
-        doubt.widen(&mut pixel.light, brightest);
+        doubt.widen(&mut pixel.light, range);
         pixel
     }
 
-    /// A shape on a ray, where anything of it is left by all that cuts it.
-    fn meet<'s>(&'s self, shape: &'s Prepared, ray: &Ray, seen: &Stretches) -> Option<Met<'s>> {
+    /// What the application has drawn at a pixel of the viewport, and what its colour takes the
+    /// lowest and highest number of all colours beyond 0 and what they are.
+    fn drawn_by_application(&self, x: usize, y: usize) -> (Option<Hit>, [f64; 2]) {
+        let (Some(opaque), Some(limits)) = (&self.frame.opaque, &self.limits) else { return (None, [0.0; 2]) };
+        let Viewport { x: left, y: top, width, .. } = self.viewport;
+        let [r, g, b, a] = opaque.color_at((top + y) * self.frame.width + left + x).map(f64::from);
+        let mark = Mark::exact(limits[y * width + x]);
+        let hit = Hit { mark, light: [r, g, b].map(|c| [c; 2]), alpha: [a.clamp(0.0, 1.0); 2] };
+        let (lowest, highest) = (r.min(g).min(b), r.max(g).max(b));
+        // Premultiplied colours up to the opacity are no brighter than white.
+        (Some(hit), [lowest.min(0.0), if highest <= a { 0.0 } else { highest.max(0.0) }])
+    }
+
+    /// A shape on a ray, where anything of it is left by all that cuts it; and its slices' hits.
+    fn meet<'s>(&'s self, shape: &'s Prepared, ray: &Ray, seen: &Stretches, hits: &mut Vec<Hit>) -> Option<Met<'s>> {
         let sight = Sight::new(ray, &shape.to_object, shape.center)?;
         let mut stretches = seen.clone();
         sight.clip(&shape.clip, &self.frame.clip, &mut stretches);
@@ -167,16 +199,24 @@ impl<'a> Scene<'a> {
         let way = match &shape.body {
             Body::Grid(body) => {
                 body.place.crop(&sight, &mut stretches);
+                slices::of_grid(shape, body, &sight, &stretches, hits);
                 Way::Grid(body, body.place.lines(&sight, &stretches))
             }
             Body::Carved(mesh, body) => {
                 body.place.crop(&sight, &mut stretches);
                 let inside = mesh.trace(&sight).stretches(gap).meet(&stretches);
+                slices::of_grid(shape, body, &sight, &inside, hits);
                 Way::Grid(body, body.place.lines(&sight, &inside))
             }
-            Body::Cells(cells) => Way::Cells(cells, cells.meet(&shape.medium, &sight, gap, &stretches)),
+            Body::Cells(cells) => {
+                let way = cells.meet(&shape.medium, &sight, gap, &stretches);
+                slices::of_cells(shape, cells, &sight, &way, hits);
+                Way::Cells(cells, way)
+            }
         };
-        Some(Met { shape, anchor: sight.anchor, way })
+        let met = Met { shape, anchor: sight.anchor, way };
+        let drawn = shape.slices.as_ref().is_none_or(|s| s.volume);
+        (drawn && (met.is_through() || met.grazed() > 0.0)).then_some(met)
     }
 
     fn counting(&self, ray: &Ray) -> Option<Counting> {
@@ -212,18 +252,28 @@ impl<'a> Scene<'a> {
         (gathered.light(shape.compositing, &shape.medium), samples)
     }
 
-    /// The depth-composited shapes of a ray.
-    fn over(&self, ray: &Ray, shapes: &[Met<'_>], brightest: f64, cutter: &mut Cutter) -> (Light, u64) {
+    /// The depth-composited shapes of a ray, and hits in order.
+    fn over(
+        &self,
+        ray: &Ray,
+        shapes: &[Met<'_>],
+        hits: Vec<Hit>,
+        range: [f64; 2],
+        cutter: &mut Cutter,
+    ) -> (Light, u64) {
         let counting = self.counting(ray);
-        let zero = shapes[0].anchor;
-        let mut march = March::new(f64::from(self.frame.depth_threshold), brightest);
+        let mut march = March::new(f64::from(self.frame.depth_threshold), range);
+        let first = hits.first().map(|h| h.mark.t.hi).filter(|t| t.is_finite());
+        let zero = shapes.first().map(|m| m.anchor).or(first).unwrap_or(0.0);
         if let [met] = shapes
             && met.track_count() == 1
+            && hits.is_empty()
         {
             self.pieces(met, 0, counting.as_ref(), cutter, |piece, _| march.advance(std::slice::from_ref(piece)));
         } else {
-            let (tracks, snap) = self.tracks(shapes, zero, counting.as_ref(), cutter);
-            overlap::sweep(&tracks, snap, |pieces| march.advance(pieces));
+            let mut along = self.along(shapes, zero, counting.as_ref(), cutter);
+            along.add_hits(hits, zero);
+            overlap::sweep(&along, &mut march);
         }
         let samples = march.stretches;
         let mut light = march.finish();
@@ -277,33 +327,24 @@ impl<'a> Scene<'a> {
         }
     }
 
-    /// All shapes' pieces, counted from one zero, and the distance within which ends are one.
-    fn tracks(
-        &self,
-        shapes: &[Met<'_>],
-        zero: f64,
-        counting: Option<&Counting>,
-        cutter: &mut Cutter,
-    ) -> (Vec<Track>, f64) {
-        let mut snap = 0f64;
-        let mut tracks = Vec::with_capacity(shapes.len());
-        // Where stretches begin, the same place once.
-        let mut starts: Vec<Mark> = Vec::new();
+    /// All shapes' pieces, counted from one zero.
+    fn along(&self, shapes: &[Met<'_>], zero: f64, counting: Option<&Counting>, cutter: &mut Cutter) -> Along {
+        let mut along = Along::default();
         for met in shapes {
             let shift = met.anchor - zero;
             let around = 8.0 * EPS * (met.anchor.abs() + zero.abs() + shift.abs());
             for number in 0..met.track_count() {
                 let mut track = Track::new();
                 self.pieces(met, number, counting, cutter, |piece, start| {
-                    snap = snap.max(2.0 * start.dt + around);
-                    let entry = (piece.t[0] == start.t).then(|| number_of(&mut starts, start.mark));
+                    along.snap = along.snap.max(2.0 * start.dt + around);
+                    let entry = (piece.t[0] == start.t).then(|| number_of(&mut along.starts, start.mark));
                     track.push(Piece { t: piece.t.map(|t| t + shift), entry, ..*piece });
                     true
                 });
-                tracks.push(track);
+                along.tracks.push(track);
             }
         }
-        (tracks, snap)
+        along
     }
 }
 
@@ -354,12 +395,14 @@ impl Doubt {
         }
     }
 
-    fn widen(&self, light: &mut Light, brightest: f64) {
+    fn widen(&self, light: &mut Light, [darkest, brightest]: [f64; 2]) {
         if self.whole || self.width >= brightest {
-            light.lower = [0.0; 4];
+            light.lower = [darkest, darkest, darkest, 0.0];
             light.upper = [brightest, brightest, brightest, 1.0];
         } else if self.width > 0.0 {
-            light.lower.iter_mut().for_each(|v| *v = (*v - self.width).max(0.0));
+            let [color @ .., alpha] = &mut light.lower;
+            color.iter_mut().for_each(|v| *v = (*v - self.width).max(darkest));
+            *alpha = (*alpha - self.width).max(0.0);
             light.upper.iter_mut().for_each(|v| *v += self.width);
             light.upper[3] = light.upper[3].min(1.0);
         }

@@ -119,6 +119,15 @@ impl Sheared {
         Meeting::Through(if first.tau.sign_from(second.tau) <= 0.0 { [first, second] } else { [second, first] })
     }
 
+    /// Meets a triangle; `None` where the ray passes beside it. Tells whether the ray had to be
+    /// moved aside, too.
+    pub fn meet_triangle(&self, corners: &[Corner; 3], lean: Lean, tie: &mut bool) -> Option<Pass> {
+        let [a, b, c] = corners;
+        let signs = [side(a, b, lean, tie), side(b, c, lean, tie), side(c, a, lean, tie)];
+        let through = signs[0] != 0.0 && signs[0] == signs[1] && signs[1] == signs[2];
+        through.then(|| self.pass(&[*a, *b, *c, *a], [0, 1, 2]))
+    }
+
     fn pass(&self, all: &[Corner; 4], corners: [usize; 3]) -> Pass {
         let [a, b, c] = corners.map(|i| &all[i]);
         let edges = [edge(b, c), edge(c, a), edge(a, b)];

@@ -91,7 +91,7 @@ impl Geometry for Ball {
         Aabb::new(volact_core::glam::DVec3::NEG_ONE, volact_core::glam::DVec3::ONE)
     }
     fn tessellate(&self) -> Result<Tessellation, GeometryError> {
-        Ok(Tessellation::default())
+        Err(GeometryError::invalid(self.name(), "air", 0, "some"))
     }
     fn as_any(&self) -> &dyn std::any::Any {
         self
@@ -102,8 +102,12 @@ impl Geometry for Ball {
 fn what_it_cannot_draw_is_named() {
     let shape = ramp();
     shape.set_geometry(Ball);
-    let message = action(&[]).manage(&shape).unwrap_err().to_string();
-    assert!(message.contains("geometry \"ball\"") && message.contains("use a block"), "{message}");
+    let mut burst = action(&[]);
+    burst.manage(&shape).unwrap();
+    burst.begin_draw(&along_z(0.4, 0.5)).unwrap();
+    burst.draw(&shape).unwrap();
+    let ActionError::Geometry { source, .. } = burst.end_draw().unwrap_err() else { panic!("another error") };
+    assert_eq!(source.to_string(), "geometry \"ball\": air is 0, wanted some");
     let data = volume_of([2; 3], |_| 0.0);
     let shape = Shape::around(&data, Appearance::new("mip").with("component", 2i64));
     let message = action(&[]).manage(&shape).unwrap_err().to_string();
