@@ -103,7 +103,7 @@ impl RenderAction for CpuAction {
         let guess = || Ok(Plan::guess(&managed, &self.settings));
         let plan = if asked { Plan::new(&managed, &self.settings) } else { guess() };
         let plan = match plan {
-            Ok(plan) => self.last.unwrap_or(plan),
+            Ok(plan) => self.last.clone().unwrap_or(plan),
             Err(error) => {
                 self.lifecycle.abandon();
                 return Err(error);
@@ -111,7 +111,11 @@ impl RenderAction for CpuAction {
         };
         let mut rebuilt = Vec::new();
         self.resources.retain(shapes.iter());
-        self.resources.prepare(shapes.iter(), &plan, &self.settings, &mut rebuilt);
+        let how = (&self.settings, &self.lifecycle.context().progress);
+        if let Err(error) = self.resources.prepare(shapes.iter(), &plan, how, &mut rebuilt) {
+            self.lifecycle.abandon();
+            return Err(error);
+        }
         self.started = Some(Started { at: start, plan, rebuilt });
         Ok(())
     }
@@ -129,9 +133,10 @@ impl RenderAction for CpuAction {
         // What is managed but not drawn must not change the picture.
         let plan = Plan::new(&drawn, &self.settings)?;
         if plan != prepared {
-            self.resources.prepare(drawn.iter().copied(), &plan, &self.settings, &mut rebuilt);
+            let how = (&self.settings, &self.lifecycle.context().progress);
+            self.resources.prepare(drawn.iter().copied(), &plan, how, &mut rebuilt)?;
         }
-        self.last = (!drawn.is_empty()).then_some(plan);
+        self.last = (!drawn.is_empty()).then(|| plan.clone());
         let prepare = start.elapsed();
         let mut frame = Frame::empty(&open.desc);
         let counts = Picture::new(&open, &drawn, &self.resources, &self.settings, &plan)?.draw(&mut frame);

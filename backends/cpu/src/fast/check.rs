@@ -6,19 +6,20 @@ use super::options::Settings;
 
 /// The action's name.
 pub const NAME: &str = "cpu";
-const SHADERS: [&str; 6] = ["simple", "lut", "mip", "minip", "average", "xray"];
+const SHADERS: [&str; 8] = ["simple", "lut", "mip", "minip", "average", "xray", "attribute", "surface"];
 
 /// What it can do.
 pub fn caps(settings: &Settings) -> Caps {
     Caps {
         shaders: Some(SHADERS.map(str::to_owned).to_vec()),
-        geometries: Some(vec!["block".into()]),
+        geometries: None,
         compositing: vec![
             Compositing::Over,
             Compositing::Maximum,
             Compositing::Minimum,
             Compositing::Average,
             Compositing::Add,
+            Compositing::First,
         ],
         overlap: true,
         depth: true,
@@ -38,21 +39,30 @@ pub fn check(shape: &ResolvedShape) -> Result<(), ActionError> {
     if !SHADERS.contains(&shader) {
         return unsupported(format!("shader {shader:?}"), &format!("it draws {}", SHADERS.join(", ")));
     }
-    if shape.state.geometry.as_block().is_none() {
-        return unsupported(format!("geometry {:?}", shape.state.geometry.name()), "it draws blocks");
+    let geometry = &shape.state.geometry;
+    let (found, is_surface) = (geometry.name(), geometry.as_surface().is_some());
+    if (shader == "surface") != is_surface {
+        return unsupported(
+            format!("geometry {found:?} with shader {shader:?}"),
+            "a surface goes with the shader \"surface\", and that with nothing else",
+        );
     }
-    if let Some(texture) = shape.volume("volume") {
-        let components = texture.volume().desc().components;
-        let wanted = shape.int("component").unwrap_or(0);
-        if wanted >= components as i64 {
-            return unsupported(
-                format!("component {wanted} of a volume with {components}"),
-                &format!("name one of 0 to {}", components - 1),
-            );
-        }
+    if geometry.slices().is_some() && shape.compositing() != Compositing::Over {
+        return unsupported(
+            format!("slice planes with shader {shader:?}"),
+            "draw them with a shader of compositing over, such as lut",
+        );
     }
-    if matches!(shape.compositing(), Compositing::First) {
-        return unsupported("compositing first".into(), "it draws over, maximum, minimum, average and add");
+    let components = shape
+        .volume("volume")
+        .map(|t| ("a volume", t.volume().desc().components))
+        .or_else(|| shape.attribute("scalars").map(|a| ("scalars", a.components)));
+    let wanted = shape.int("component").unwrap_or(0);
+    if let Some((what, count)) = components.filter(|(_, count)| wanted >= *count as i64) {
+        return unsupported(
+            format!("component {wanted} of {what} with {count}"),
+            &format!("name one of 0 to {}", count - 1),
+        );
     }
     Ok(())
 }

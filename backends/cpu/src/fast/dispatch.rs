@@ -4,13 +4,22 @@
 use volact_core::camera::LinearRays;
 
 use super::{
-    fetch::{self, Access},
-    over::{self, Pixels},
-    packet::{Bundle, Packet, Place, Span},
+    direct,
+    fetch::{self, Access, Base, Fetch, Voxels},
+    over::{self, Classes, Pixels},
+    packet::{Bundle, Cuts, Packet, Place, Span},
+    preintegrate::SegmentPairs,
     reduce::{self, Reduced},
     simd::{LANES, Plain, Simd, Unit},
+    sweep::{
+        gather::{self, Chunk, Row},
+        merge::{self, Rows, Sights},
+    },
     walk::Counts,
 };
+
+/// Positions by axis and lane, relative to a base.
+type Local = [[f32; LANES]; 3];
 
 /// Runs `$call` with `F` bound to the fetcher of an access.
 macro_rules! by_access {
@@ -45,9 +54,20 @@ macro_rules! by_access {
 }
 
 #[inline(always)]
-unsafe fn over_by<S: Simd>(job: &over::Job<'_>, packet: &Packet, pixels: &mut Pixels, counts: &mut Counts) {
+unsafe fn whole_by<S: Simd>(
+    job: &over::Job<'_>,
+    at: (&Packet, &Cuts),
+    done: u32,
+    pixels: &mut Pixels,
+    counts: &mut Counts,
+) -> u32 {
     // SAFETY: the caller's promises.
-    by_access!(job.voxels.access(), F => unsafe { over::draw::<S, F>(job, packet, pixels, counts) })
+    unsafe {
+        if let Classes::Direct(_) = job.classes {
+            return over::draw_direct::<S>(job, at, done, pixels, counts);
+        }
+        by_access!(job.voxels.access(), F => over::draw_numbers::<S, F>(job, at, done, pixels, counts))
+    }
 }
 
 #[inline(always)]
@@ -122,9 +142,95 @@ by_unit! {
 }
 
 by_unit! {
-    /// Draws a packet of an `over` shape behind what is there.
-    draw(job: &over::Job<'_>, packet: &Packet, pixels: &mut Pixels, counts: &mut Counts),
-    S => over_by::<S>(job, packet, pixels, counts)
+    /// Draws the whole segments of an `over` shape behind what is there; returns the lanes that are
+    /// done.
+    whole(
+        job: &over::Job<'_>,
+        at: (&Packet, &Cuts),
+        done: u32,
+        pixels: &mut Pixels,
+        counts: &mut Counts
+    ) -> u32,
+    S => whole_by::<S>(job, at, done, pixels, counts)
+}
+
+/// Draws a packet of an `over` shape behind what is there.
+pub fn draw(job: &over::Job<'_>, packet: &Packet, pixels: &mut Pixels, counts: &mut Counts) {
+    over::draw(job, packet, pixels, counts, |cuts, done, pixels, counts| {
+        whole(job.unit, job, (packet, cuts), done, pixels, counts)
+    });
+}
+
+#[inline(always)]
+unsafe fn classify_by<S: Simd>(job: &over::Job<'_>, base: &Base, local: &Local, live: u32, out: &mut Row) {
+    match job.classes {
+        // SAFETY: the caller's promises.
+        Classes::Middle(table) => by_access!(job.voxels.access(), F => unsafe {
+            over::classify::<S, F>(job, table, (base, local), live, out);
+        }),
+        Classes::Direct(direct) => direct.entries((job.unit, &job.voxels), base, local, live, out),
+        Classes::Ends(_) => *out = [[0.0; 4]; LANES],
+    }
+}
+
+by_unit! {
+    /// What whole segments add whose middles lie at positions relative to a base. Not for
+    /// classification by both ends.
+    classify(job: &over::Job<'_>, base: &Base, local: &Local, live: u32, out: &mut Row),
+    S => classify_by::<S>(job, base, local, live, out)
+}
+
+by_unit! {
+    /// What whole segments add between sixteen pairs of numbers.
+    pairs(pairs: &SegmentPairs, ends: [&[f32; LANES]; 2], live: u32, out: &mut Row),
+    S => over::pair_entries::<S>(pairs, ends, live, out)
+}
+
+#[inline(always)]
+unsafe fn numbers_by<S: Simd>(voxels: &Voxels<'_>, base: &Base, local: &Local, out: &mut [f32; LANES]) {
+    // SAFETY: the caller's promises.
+    unsafe {
+        let p = [S::load(&local[0]), S::load(&local[1]), S::load(&local[2])];
+        by_access!(voxels.access(), F => S::store(F::fetch::<S>(voxels, base, p), out));
+    }
+}
+
+by_unit! {
+    /// The numbers at positions relative to a base.
+    numbers(voxels: &Voxels<'_>, base: &Base, local: &Local, out: &mut [f32; LANES]),
+    S => numbers_by::<S>(voxels, base, local, out)
+}
+
+/// # Safety
+/// None of its own: it is unsafe so that it is called like the kernels.
+#[inline(always)]
+unsafe fn absorbed_by(opacity: &[f32; LANES], length: f64, out: &mut [f32; LANES]) {
+    direct::absorbed(opacity, length, out);
+}
+
+by_unit! {
+    /// What lengths absorb, in unit distances, by the opacity over one.
+    absorbed(opacity: &[f32; LANES], length: f64, out: &mut [f32; LANES]),
+    => absorbed_by(opacity, length, out)
+}
+
+by_unit! {
+    /// Gathers a chunk of one stretch; returns the next segment in which there may be something.
+    gather(
+        job: &over::Job<'_>,
+        at: (&Packet, &Cuts),
+        first: i64,
+        done: u32,
+        chunk: &mut Chunk,
+        counts: &mut Counts
+    ) -> i64,
+    S => gather::gather::<S>(job, at, first, done, chunk, counts)
+}
+
+by_unit! {
+    /// Puts together what several shapes add.
+    merge(chunks: &[&Chunk], rows: Rows, special: u32, sights: &mut Sights),
+    S => merge::merge::<S>(chunks, rows, special, sights)
 }
 
 by_unit! {

@@ -78,8 +78,7 @@ impl<'a> Voxels<'a> {
         let [nx, ny, _] = self.dims;
         let reach = self.bytes.len() <= i32::MAX as usize && self.bytes.len() >= 4 && nx.max(ny) < 1 << 20;
         let pairs = self.max[0] > self.min[0] || self.scalar == ScalarType::F32;
-        let stored = self.origin == 0.0 && self.gain == 1.0;
-        if self.components != 1 || self.nearest || !reach || !pairs || !stored {
+        if self.components != 1 || self.nearest || !reach || !pairs || !self.stored() {
             return Access::Scattered;
         }
         match self.scalar {
@@ -92,11 +91,27 @@ impl<'a> Voxels<'a> {
         }
     }
 
+    /// Whether numbers are fetched as they are stored.
+    pub fn stored(&self) -> bool {
+        self.origin == 0.0 && self.gain == 1.0
+    }
+
+    /// Where a voxel's first number is.
+    #[inline]
+    pub fn index(&self, x: usize, y: usize, z: usize) -> usize {
+        ((z * self.dims[1] + y) * self.dims[0] + x) * self.components
+    }
+
+    /// The number at an index as `(stored − origin) · gain`.
+    #[inline]
+    pub fn number(&self, index: usize) -> f32 {
+        ((self.scalar.read(self.bytes, index) - self.origin) * self.gain) as f32
+    }
+
     /// One number as `(stored − origin) · gain`.
     #[inline]
     pub fn at(&self, x: usize, y: usize, z: usize) -> f32 {
-        let index = ((z * self.dims[1] + y) * self.dims[0] + x) * self.components + self.component;
-        ((self.scalar.read(self.bytes, index) - self.origin) * self.gain) as f32
+        self.number(self.index(x, y, z) + self.component)
     }
 }
 
@@ -307,7 +322,10 @@ impl Fetch for Scattered {
     }
 }
 
-fn scattered(voxels: &Voxels<'_>, base: &Base, local: [f32; 3]) -> f32 {
+/// The lowest voxel of the cell at a local position, steps to its neighbours and fractions; where
+/// the filter is nearest, that voxel and no fractions.
+#[inline(always)]
+pub fn cell_of(voxels: &Voxels<'_>, base: &Base, local: [f32; 3]) -> ([usize; 3], [usize; 3], [f32; 3]) {
     let mut i = [0usize; 3];
     let mut f = [0f32; 3];
     let mut step = [0usize; 3];
@@ -323,6 +341,11 @@ fn scattered(voxels: &Voxels<'_>, base: &Base, local: [f32; 3]) -> f32 {
             i[a] = voxels.min[a];
         }
     }
+    (i, step, f)
+}
+
+fn scattered(voxels: &Voxels<'_>, base: &Base, local: [f32; 3]) -> f32 {
+    let (i, step, f) = cell_of(voxels, base, local);
     if voxels.nearest {
         return voxels.at(i[0], i[1], i[2]);
     }

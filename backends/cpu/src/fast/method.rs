@@ -5,40 +5,47 @@ use volact_core::{Compositing, LookupTable, Method, TableInterpolation, Warning,
 use super::{
     check::caps,
     options::{Classification, Settings},
-    plan::{Plan, uses_general},
+    plan::Plan,
     resources::Resources,
 };
 
 /// How the shapes drawn were made into a picture.
 pub fn method(drawn: &[&ResolvedShape], plan: &Plan, resources: &Resources, settings: &Settings) -> Method {
+    let voxels = drawn.iter().any(|s| s.volume("volume").is_some());
+    let cells = drawn.iter().any(|s| s.attribute("scalars").is_some());
+    let walls = drawn.iter().any(|s| s.state.geometry.as_surface().is_some());
+    let sampling = [
+        // A frame without shapes says what would have been done.
+        (voxels || !(cells || walls)).then_some("ray casting, midpoint lattice"),
+        cells.then_some("cell by cell"),
+        walls.then_some("nearest triangle"),
+    ];
     let mut classification: Vec<&str> = Vec::new();
-    let mut width = 0;
     let mut formats: Vec<String> = Vec::new();
-    for shape in drawn {
-        let tables = resources.tables(shape.id);
-        let general = plan.general && shape.compositing() == Compositing::Over;
-        let word = match (shape.compositing(), shape.table("lookup_table").map(LookupTable::interpolation)) {
+    for shape in drawn.iter().filter(|s| s.state.geometry.as_surface().is_none()) {
+        let pre_integrated = resources.tables(shape.id).is_some_and(|t| t.pre_integrated());
+        let table = shape.table("lookup_table").map(LookupTable::interpolation);
+        classification.push(match (shape.compositing(), table) {
+            _ if shape.attribute("scalars").is_some() => "linear in each cell",
             (Compositing::Over, Some(TableInterpolation::Pre)) => "pre-interpolated",
             (Compositing::Over, None) => "components",
-            (Compositing::Over, _) if !general && tables.is_some_and(|t| t.pairs.is_some()) => "pre-integrated",
+            (Compositing::Over, _) if pre_integrated => "pre-integrated",
             _ => "post-interpolated",
-        };
-        classification.push(word);
-        if let Some(t) = tables.filter(|_| !general) {
-            width = width.max(t.pairs.as_ref().map_or(t.table.nodes, |p| p.nodes));
-        }
+        });
         formats.extend(shape.volume("volume").map(|v| v.volume().desc().scalar.to_string()));
+        formats.extend(shape.attribute("scalars").map(|a| a.scalar.to_string()));
     }
     classification.dedup();
     formats.dedup();
+    let width = drawn.iter().filter_map(|s| resources.tables(s.id)).map(|t| t.width()).max();
     Method {
-        sampling: "ray casting, midpoint lattice".into(),
-        sample_distance: plan.step,
+        sampling: sampling.into_iter().flatten().collect::<Vec<_>>().join(", "),
+        sample_distance: if voxels || drawn.is_empty() { plan.step } else { 0.0 },
         classification: classification.join(", "),
-        table_width: width,
+        table_width: width.unwrap_or(0),
         texture_format: formats.join(", "),
         filter: "f32, exact weights".into(),
-        blend: if uses_general(drawn) { "f64" } else { "f32" }.into(),
+        blend: "f32".into(),
         termination: settings.termination,
         device: caps(settings).device,
     }
@@ -47,10 +54,12 @@ pub fn method(drawn: &[&ResolvedShape], plan: &Plan, resources: &Resources, sett
 /// Settings asked for that a shape's way of drawing has no use for.
 pub fn adjusted(drawn: &[&ResolvedShape], resources: &Resources, settings: &Settings) -> Vec<Warning> {
     let asked = settings.classification == Classification::PreIntegrated;
-    let tabled = |s: &&&ResolvedShape| s.compositing() == Compositing::Over && s.table("lookup_table").is_some();
-    let without = |s: &&&ResolvedShape| resources.tables(s.id).is_none_or(|t| t.pairs.is_none());
+    let tabled = |s: &&&ResolvedShape| {
+        s.compositing() == Compositing::Over && s.volume("volume").is_some() && s.table("lookup_table").is_some()
+    };
+    let without = |s: &&&ResolvedShape| resources.tables(s.id).is_none_or(|t| !t.pre_integrated());
     let warn = |s: &&ResolvedShape| {
-        let message = "classification pre-integrated is not done for overlapping shapes, \
+        let message = "classification pre-integrated is not done for overlapping shapes, deformed meshes, \
                        pre-interpolated tables and the nearest filter; it is drawn without";
         Warning::new(WarningCode::SettingAdjusted, &s.name, message)
     };

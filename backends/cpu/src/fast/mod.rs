@@ -12,18 +12,23 @@
 //! Geometries other than blocks are not drawn yet: an error says so.
 
 pub mod action;
+pub mod bent;
 pub mod bounds;
 pub mod check;
 pub mod classify;
+pub mod direct;
 pub mod dispatch;
 pub mod fetch;
-pub mod general;
+pub mod flat;
+pub mod limits;
+pub mod medium;
 pub mod method;
 pub mod mesh;
 pub mod options;
 pub mod order;
 pub mod over;
 pub mod packet;
+pub mod part;
 pub mod picture;
 pub mod plan;
 pub mod preintegrate;
@@ -31,6 +36,9 @@ pub mod reduce;
 pub mod resources;
 pub mod sharp;
 pub mod simd;
+pub mod stretches;
+pub mod surface;
+pub mod sweep;
 pub mod walk;
 
 use std::sync::Arc;

@@ -1,59 +1,219 @@
-//! Shapes that no ray of a packet meets at the same place: one pass of a kernel for each, from
-//! front to back, each going on from what the ones before it left.
+//! The `over` shapes of sixteen rays.
+//!
+//! Where no ray meets two at the same place, and nothing without thickness lies inside one, each
+//! gets passes of its kernel from front to back, which go on from what the ones before left;
+//! otherwise they are put together by a [`sweep`](super::sweep).
+
+use volact_core::lattice::Lattice;
 
 use super::{
     dispatch,
-    over::{self, Pixels},
-    packet::{Bundle, Packet, Place, Span},
+    limits::Ends,
+    over::{Job, Pixels},
+    packet::{Bundle, Span},
+    part::{Aimed, Content, Part, lane},
     simd::{LANES, Unit},
+    sweep::{
+        self, Layer, Scene,
+        piece::{Hit, Piece, Sight},
+    },
     walk::Counts,
 };
 
-/// A shape, ready to be drawn.
-pub struct Part<'a> {
-    /// What its kernel needs.
-    pub job: over::Job<'a>,
-    /// Where it lies.
-    pub place: Place,
+/// Distance within which places are one, as a part of themselves.
+const SNAP: f64 = 1e-13;
+
+/// The `over` shapes of a picture.
+#[derive(Debug)]
+pub struct Over<'a> {
+    /// In rising order of their identities, which is that of sums.
+    pub parts: Vec<Part<'a>>,
+    /// The vector unit.
+    pub unit: Unit,
+    /// The frame's lattice.
+    pub lattice: Lattice,
+    /// Rays end where less than this is left to see.
+    pub termination: f32,
+    /// The opacity at which depth is taken.
+    pub threshold: f32,
 }
 
-/// Draws sixteen rays through all parts; returns those that met one.
-pub fn draw(unit: Unit, parts: &[Part<'_>], bundle: &Bundle, pixels: &mut Pixels, counts: &mut Counts) -> u32 {
-    let aimed = parts.iter().map(|p| (p, dispatch::aim(unit, bundle, &bundle.span, &p.place)));
-    let met: Vec<(&Part<'_>, Packet)> = aimed.filter(|(_, packet)| packet.active != 0).collect();
-    match met.as_slice() {
-        [] => 0,
-        [(part, packet)] => {
-            dispatch::draw(unit, &part.job, packet, pixels, counts);
-            packet.active
+/// A stretch of a ray inside a part: of which one, and the how-manieth.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Stretch {
+    t: [f64; 2],
+    part: usize,
+    number: usize,
+}
+
+/// The parts that sixteen rays meet.
+type Met<'p, 'a> = [(&'p Part<'a>, Aimed)];
+
+impl Over<'_> {
+    /// Draws sixteen rays where `span` holds them, with what ends them; returns those that met
+    /// something.
+    pub fn draw(
+        &self,
+        bundle: &Bundle,
+        span: &Span,
+        ends: Option<Ends>,
+        pixels: &mut Pixels,
+        counts: &mut Counts,
+    ) -> u32 {
+        let aimed = self.parts.iter().filter_map(|p| Some((p, p.region.aim(self.unit, bundle, span)?)));
+        let mut aimed: Vec<(&Part<'_>, Aimed)> = aimed.collect();
+        let ended = ends.as_ref().map_or(0, |e| e.met);
+        let met = aimed.iter().fold(ended, |met, (_, a)| met | a.stretches.active());
+        let hits = ends.map(|e| e.hits).filter(|_| ended != 0);
+        let sliced = aimed.iter().any(|(part, _)| part.is_sliced());
+        if let ([(part, only)], None, false) = (aimed.as_slice(), &hits, sliced)
+            && let Content::Voxels(job) = &part.content
+            && only.bent.is_none()
+        {
+            self.alone(job, only, pixels, counts);
+            return met;
         }
-        several => {
-            rounds(several, |(part, packet), lanes| {
-                let span = Span { active: lanes, ..packet.span() };
-                dispatch::draw(unit, &part.job, &packet.within(&span), pixels, counts);
-            });
-            several.iter().fold(0, |all, (_, packet)| all | packet.active)
+        let hits = self.hits(bundle, &aimed, hits);
+        aimed.retain(|(part, _)| part.volume);
+        match self.stretches(&aimed, &hits) {
+            Some(stretches) => self.in_order(&aimed, &stretches, &hits, pixels, counts),
+            None => self.together(bundle, &aimed, &hits, pixels, counts),
+        }
+        met
+    }
+
+    /// Draws the only part there is.
+    fn alone(&self, job: &Job<'_>, aimed: &Aimed, pixels: &mut Pixels, counts: &mut Counts) {
+        for span in aimed.stretches.spans() {
+            dispatch::draw(job, &aimed.packet.within(span), pixels, counts);
         }
     }
-}
 
-/// Visits every interval of every ray from front to back, those of several rays together where
-/// they are next in the same packet.
-fn rounds<'p, P>(packets: &'p [(P, Packet)], mut visit: impl FnMut(&'p (P, Packet), u32)) {
-    let mut waiting: [Vec<usize>; LANES] = std::array::from_fn(|l| {
-        let mut order: Vec<usize> = (0..packets.len()).filter(|&i| packets[i].1.active >> l & 1 == 1).collect();
-        // Last comes first to be taken.
-        order.sort_by(|&a, &b| packets[b].1.start[l].total_cmp(&packets[a].1.start[l]));
-        order
-    });
-    while let Some(next) = waiting.iter().find_map(|order| order.last().copied()) {
-        let mut lanes = 0;
-        for (l, order) in waiting.iter_mut().enumerate() {
-            if order.last() == Some(&next) {
-                order.pop();
-                lanes |= 1 << l;
+    /// All hits by lane, in order.
+    fn hits(&self, bundle: &Bundle, aimed: &Met<'_, '_>, at_ends: Option<[Vec<Hit>; LANES]>) -> [Vec<Hit>; LANES] {
+        let mut hits = at_ends.unwrap_or_default();
+        for (part, aimed) in aimed.iter().filter(|(part, _)| part.is_sliced()) {
+            part.slice(bundle, aimed, &mut hits);
+        }
+        // Where sums are made in the order of colours they depend on no other order.
+        let order = |a: &Hit, b: &Hit| {
+            let colors = a.color.iter().zip(&b.color).map(|(a, b)| a.total_cmp(b));
+            colors.fold(a.t.total_cmp(&b.t), std::cmp::Ordering::then)
+        };
+        hits.iter_mut().for_each(|hits| hits.sort_by(order));
+        hits
+    }
+
+    /// The stretches of each lane in order; `None` where some overlap, hold a hit, or have no kernel
+    /// of their own.
+    fn stretches(&self, aimed: &Met<'_, '_>, hits: &[Vec<Hit>; LANES]) -> Option<[Vec<Stretch>; LANES]> {
+        let straight =
+            |(part, aimed): &(&Part<'_>, Aimed)| matches!(part.content, Content::Voxels(_)) && aimed.bent.is_none();
+        if !aimed.iter().all(straight) {
+            return None;
+        }
+        let mut all: [Vec<Stretch>; LANES] = Default::default();
+        for (l, lane) in all.iter_mut().enumerate() {
+            for (part, (_, aimed)) in aimed.iter().enumerate() {
+                let stretches = aimed.stretches.lane(l).enumerate();
+                lane.extend(stretches.map(|(number, t)| Stretch { t, part, number }));
+            }
+            lane.sort_by(|a, b| a.t[0].total_cmp(&b.t[0]));
+            let near = |t: f64| SNAP * t.abs();
+            let overlap = lane.windows(2).any(|s| s[1].t[0] < s[0].t[1] - near(s[0].t[1]));
+            let inside = |h: &Hit, s: &Stretch| s.t[0] + near(h.t) < h.t && h.t < s.t[1] - near(h.t);
+            if overlap || hits[l].iter().any(|h| lane.iter().any(|s| inside(h, s))) {
+                return None;
             }
         }
-        visit(&packets[next], lanes);
+        Some(all)
+    }
+
+    /// Draws stretches that are apart, those of several rays together where they are next in the
+    /// same part.
+    fn in_order(
+        &self,
+        aimed: &Met<'_, '_>,
+        stretches: &[Vec<Stretch>; LANES],
+        hits: &[Vec<Hit>; LANES],
+        pixels: &mut Pixels,
+        counts: &mut Counts,
+    ) {
+        let (mut next, mut met) = ([0; LANES], [0; LANES]);
+        loop {
+            for l in 0..LANES {
+                let until = stretches[l].get(next[l]).map_or(f64::INFINITY, |s| s.t[0] + SNAP * s.t[0].abs());
+                self.meet(l, &hits[l], &mut met[l], until, pixels);
+            }
+            let head = |l: usize| stretches[l].get(next[l]).map(|s| (s.part, s.number));
+            let Some((part, number)) = (0..LANES).find_map(head) else { return };
+            let mut span = aimed[part].1.stretches.spans()[number];
+            span.active = (0..LANES).fold(0, |lanes, l| lanes | u32::from(head(l) == Some((part, number))) << l);
+            if let (Part { content: Content::Voxels(job), .. }, Aimed { packet, .. }) = &aimed[part] {
+                dispatch::draw(job, &packet.within(&span), pixels, counts);
+            }
+            (0..LANES).for_each(|l| next[l] += (span.active >> l & 1) as usize);
+        }
+    }
+
+    /// Adds a lane's hits up to some `t`, those of one place at once.
+    fn meet(&self, l: usize, hits: &[Hit], met: &mut usize, until: f64, pixels: &mut Pixels) {
+        while let Some(first) = hits.get(*met).filter(|h| h.t <= until) {
+            let same = hits[*met..].partition_point(|h| h.t <= first.t + SNAP * first.t.abs());
+            let group = &hits[*met..*met + same];
+            *met += same;
+            if 1.0 - pixels.color[l][3] < self.termination {
+                continue;
+            }
+            let color = pixels.color[l].map(f64::from);
+            let mut sight = Sight { color, depth: pixels.depth[l], threshold: f64::from(self.threshold) };
+            sight.meet(group);
+            (pixels.color[l], pixels.depth[l]) = (sight.color.map(|v| v as f32), sight.depth);
+        }
+    }
+
+    /// Draws parts that meet.
+    fn together(
+        &self,
+        bundle: &Bundle,
+        aimed: &Met<'_, '_>,
+        hits: &[Vec<Hit>; LANES],
+        pixels: &mut Pixels,
+        counts: &mut Counts,
+    ) {
+        let mut pieces: [Vec<Piece>; LANES] = Default::default();
+        let mut cuts = Vec::new();
+        let mut layers = Vec::new();
+        let mut active = hits.iter().enumerate().fold(0, |a, (l, hits)| a | u32::from(!hits.is_empty()) << l);
+        for (part, aimed) in aimed {
+            active |= aimed.stretches.active();
+            match &part.content {
+                Content::Voxels(job) => layers.push(Layer {
+                    job,
+                    packet: &aimed.packet,
+                    stretches: &aimed.stretches,
+                    bent: aimed.bent.as_deref(),
+                }),
+                Content::Field(field) => {
+                    let rays = bundle.through(&part.region.place.to_object);
+                    for (l, pieces) in pieces.iter_mut().enumerate() {
+                        for span in aimed.stretches.lane(l) {
+                            field.pieces(lane(&rays, l), span, &mut cuts, pieces);
+                        }
+                    }
+                }
+            }
+        }
+        pieces.iter_mut().for_each(|p| p.sort_by(|a, b| a.t[0].total_cmp(&b.t[0])));
+        let scene = Scene {
+            layers,
+            pieces: &pieces,
+            hits,
+            active,
+            step: self.lattice.step,
+            termination: self.termination,
+            threshold: self.threshold,
+        };
+        sweep::draw(self.unit, &scene, pixels, counts);
     }
 }

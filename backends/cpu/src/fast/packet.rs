@@ -57,13 +57,12 @@ impl Span {
     /// No interval.
     pub const NONE: Self = Self { start: [0.0; LANES], end: [0.0; LANES], active: 0 };
 
-    /// Ends intervals at the latest at `limit`.
-    #[inline(always)]
+    /// Ends intervals at the latest at `limit`; those before may stay without end.
     pub fn limit(&mut self, limit: &Lanes) {
-        for (end, &limit) in self.end.iter_mut().zip(limit) {
-            *end = if limit < *end { limit } else { *end };
+        for (l, &limit) in limit.iter().enumerate() {
+            self.end[l] = self.end[l].min(limit);
+            self.active &= !(u32::from(self.start[l] >= self.end[l]) << l);
         }
-        self.settle();
     }
 
     /// Lets go of lanes whose interval has no length or no end.

@@ -4,47 +4,35 @@
 use std::sync::Mutex;
 
 use volact_core::{
-    ActionError, Compositing, Frame, LookupTable, RayGrid, Viewport, camera::LinearRays, lattice::Lattice,
-    lifecycle::OpenFrame, resolve::ResolvedShape, table::ResolvedTable,
+    ActionError, Compositing, Frame, Viewport, camera::LinearRays, frame::FrameError, lattice::Lattice,
+    lifecycle::OpenFrame, resolve::ResolvedShape,
 };
 
 use super::{
-    classify::Units,
-    dispatch, general,
+    dispatch,
+    flat::Flat,
+    limits::Limits,
     options::Settings,
-    order,
-    over::{self, Pixels},
-    packet::{Bundle, Place, SIDE},
+    order::Over,
+    over::{Pixels, under},
+    packet::{Bundle, SIDE},
+    part::Part,
     plan::Plan,
-    reduce::{self, Reduced},
-    resources::{Resources, reduction, voxels},
+    resources::Resources,
     simd::LANES,
     walk::Counts,
 };
 
-/// A shape composited by maximum, minimum, average or add.
-struct Reduction<'a> {
-    job: reduce::Job<'a>,
-    place: Place,
-    units: Units,
-    table: ResolvedTable,
-    unit: f64,
-}
-
 /// A picture to draw.
+#[derive(Debug)]
 pub struct Picture<'a> {
-    grid: RayGrid,
     rays: LinearRays,
     viewport: Viewport,
-    /// The `over` shapes.
-    parts: Vec<order::Part<'a>>,
-    /// The same, for the plain way.
-    layers: Vec<general::Layer<'a>>,
-    reductions: Vec<Reduction<'a>>,
     settings: Settings,
-    general: bool,
-    lattice: Lattice,
-    threshold: f32,
+    limits: Limits<'a>,
+    over: Over<'a>,
+    /// In the order of drawing.
+    flat: Vec<Flat<'a>>,
 }
 
 impl<'a> Picture<'a> {
@@ -59,63 +47,25 @@ impl<'a> Picture<'a> {
         settings: &Settings,
         plan: &Plan,
     ) -> Result<Self, ActionError> {
-        let viewport = open.desc.viewport();
-        let grid = open.desc.camera.rays(&viewport).map_err(volact_core::frame::FrameError::from)?;
-        let mut picture = Self {
+        let (desc, viewport) = (&open.desc, open.desc.viewport());
+        let grid = desc.camera.rays(&viewport).map_err(FrameError::from)?;
+        let (lattice, threshold) = (Lattice { step: plan.step }, desc.depth_threshold);
+        let part = |shape| Part::new(shape, &desc.clip, resources, (lattice, settings, threshold));
+        let flat = |shape| Flat::new(shape, &desc.clip, resources, settings, lattice);
+        let of = |compositing: &'static dyn Fn(Compositing) -> bool| {
+            drawn.iter().copied().filter(move |s| compositing(s.compositing()))
+        };
+        let mut parts: Vec<Part<'a>> = of(&|c| c == Compositing::Over).filter_map(part).collect();
+        parts.sort_by_key(|part| part.id);
+        let termination = settings.termination as f32;
+        Ok(Self {
             rays: grid.linear(),
-            grid,
             viewport,
-            parts: Vec::new(),
-            layers: Vec::new(),
-            reductions: Vec::new(),
             settings: *settings,
-            general: plan.general,
-            lattice: Lattice { step: plan.step },
-            threshold: open.desc.depth_threshold,
-        };
-        let empty = |id| resources.tables(id).and_then(|t| t.empty.as_ref());
-        for shape in drawn.iter().copied() {
-            if shape.compositing() != Compositing::Over {
-                picture.reductions.extend(picture.reduction(shape, resources));
-            } else if picture.general {
-                picture.layers.extend(general::Layer::new(shape, empty(shape.id)));
-            } else {
-                picture.parts.extend(picture.part(shape, resources));
-            }
-        }
-        Ok(picture)
-    }
-
-    fn part(&self, shape: &'a ResolvedShape, resources: &'a Resources) -> Option<order::Part<'a>> {
-        let (texture, tables) = (shape.volume("volume")?, resources.tables(shape.id)?);
-        let job = over::Job {
-            voxels: voxels(shape, texture).0,
-            lattice: self.lattice,
-            table: &tables.table,
-            pairs: tables.pairs.as_ref(),
-            empty: tables.empty.as_ref(),
-            termination: self.settings.termination as f32,
-            threshold: self.threshold,
-        };
-        Some(order::Part { job, place: Place::new(shape)? })
-    }
-
-    fn reduction(&self, shape: &'a ResolvedShape, resources: &'a Resources) -> Option<Reduction<'a>> {
-        let (texture, place) = (shape.volume("volume")?, Place::new(shape)?);
-        let (voxels, units) = voxels(shape, texture);
-        let skips = self.settings.skipping && !voxels.nearest;
-        let job = reduce::Job {
-            voxels,
-            lattice: self.lattice,
-            compositing: reduction(shape, units),
-            peaks: resources.peaks(shape).filter(|_| skips),
-            range: resources.bounds(shape).and_then(|b| b.range).filter(|_| skips),
-            empty: resources.zeros(shape).filter(|_| skips),
-        };
-        let grey = || LookupTable::grey(texture.range());
-        let table = shape.table("lookup_table").cloned().unwrap_or_else(grey).resolve(texture.range());
-        let unit = shape.float("unit_distance").unwrap_or(1.0);
-        Some(Reduction { job, place, units, table, unit })
+            limits: Limits::new(drawn, desc, resources, (&grid, viewport)),
+            over: Over { parts, unit: settings.unit, lattice, termination, threshold },
+            flat: of(&|c| !matches!(c, Compositing::Over | Compositing::First)).filter_map(flat).collect(),
+        })
     }
 
     /// Draws into a frame.
@@ -171,62 +121,19 @@ impl<'a> Picture<'a> {
 
     /// Draws sixteen rays; returns those that met something.
     fn packet(&self, bundle: &Bundle, pixels: &mut Pixels, counts: &mut Counts) -> u32 {
-        let unit = self.settings.unit;
-        let mut met = if self.general {
-            (0..LANES).fold(0, |met, l| met | u32::from(self.general(bundle, l, pixels, counts)) << l)
-        } else {
-            order::draw(unit, &self.parts, bundle, pixels, counts)
-        };
-        for reduction in &self.reductions {
-            let packet = dispatch::aim(unit, bundle, &bundle.span, &reduction.place);
-            if packet.active == 0 {
-                continue;
-            }
-            met |= packet.active;
-            let mut reduced = [Reduced::default(); LANES];
-            dispatch::reduce(unit, &reduction.job, &packet, &mut reduced, counts);
-            for (pixel, r) in pixels.color.iter_mut().zip(reduced) {
-                if r.length > 0.0 {
-                    *pixel = lay_over(*pixel, reduction.classify(r));
-                }
-            }
+        let mut span = bundle.span;
+        let ends = (!self.limits.is_none()).then(|| self.limits.find(bundle));
+        let behind = ends.as_ref().map(|ends| {
+            span.limit(&ends.t);
+            ends.behind
+        });
+        let mut met = self.over.draw(bundle, &span, ends, pixels, counts);
+        for (pixel, behind) in pixels.color.iter_mut().zip(behind.iter().flatten()) {
+            *pixel = under(*pixel, *behind);
+        }
+        for flat in &self.flat {
+            met |= flat.draw(self.settings.unit, bundle, &span, pixels, counts);
         }
         met
     }
-
-    /// Draws one lane the plain way; whether it met anything.
-    fn general(&self, bundle: &Bundle, l: usize, pixels: &mut Pixels, counts: &mut Counts) -> bool {
-        if bundle.span.active >> l & 1 == 0 {
-            return false;
-        }
-        let [x, y] = [bundle.pixel[0] + l % SIDE, bundle.pixel[1] + l / SIDE];
-        let ray = self.grid.ray(x as f64 + 0.5, y as f64 + 0.5);
-        let (end, threshold) = (self.settings.termination, f64::from(self.threshold));
-        let before = counts.rays;
-        let result = general::draw(&self.layers, &ray, &self.lattice, end, threshold, counts);
-        let met = counts.rays > before;
-        counts.rays = before;
-        pixels.color[l] = result.color.map(|v| v as f32);
-        pixels.depth[l] = result.depth;
-        met
-    }
-}
-
-impl Reduction<'_> {
-    /// Premultiplied colour of a reduced ray.
-    fn classify(&self, reduced: Reduced) -> [f32; 4] {
-        let units = self.units;
-        let value = match self.job.compositing {
-            Compositing::Average => units.data(reduced.value / reduced.length),
-            Compositing::Add => (reduced.value * units.scale + units.offset * reduced.length) / self.unit,
-            _ => units.data(reduced.value),
-        };
-        let [r, g, b, a] = self.table.classify(value);
-        [r * a, g * a, b * a, a].map(|v| v as f32)
-    }
-}
-
-/// One picture over another.
-fn lay_over(below: [f32; 4], above: [f32; 4]) -> [f32; 4] {
-    std::array::from_fn(|c| above[c] + (1.0 - above[3]) * below[c])
 }

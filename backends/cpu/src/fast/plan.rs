@@ -1,7 +1,6 @@
-//! What is decided for a frame before anything is prepared: the step, and which way shapes are
-//! drawn.
+//! What is decided for a frame before anything is prepared: the step, and which shapes may meet.
 
-use volact_core::{Aabb, ActionError, Compositing, TableInterpolation, resolve::ResolvedShape, shape::smallest_voxel};
+use volact_core::{Aabb, ActionError, Compositing, resolve::ResolvedShape, shape::smallest_voxel};
 
 use super::{check::NAME, options::Settings};
 
@@ -9,18 +8,23 @@ use super::{check::NAME, options::Settings};
 const MOST_SEGMENTS: f64 = 1e7;
 
 /// What tables depend on beside their shape.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
     /// World distance between samples.
     pub step: f64,
-    /// Whether `over` shapes need the plain way.
-    pub general: bool,
+    /// Shapes that may meet others, in rising order of their identities.
+    mixed: Vec<u64>,
 }
 
 impl Plan {
     /// The plan for these shapes, whatever their size.
     pub fn guess(shapes: &[&ResolvedShape], settings: &Settings) -> Self {
-        Self { step: distance(shapes, settings), general: uses_general(shapes) }
+        Self { step: distance(shapes, settings), mixed: mixed(shapes) }
+    }
+
+    /// Whether a shape may meet another, so that extinctions add.
+    pub fn mixes(&self, id: u64) -> bool {
+        self.mixed.binary_search(&id).is_ok()
     }
 
     /// The plan for these shapes.
@@ -29,7 +33,7 @@ impl Plan {
     /// If the step is too small for one of them.
     pub fn new(shapes: &[&ResolvedShape], settings: &Settings) -> Result<Self, ActionError> {
         let plan = Self::guess(shapes, settings);
-        for shape in shapes {
+        for shape in shapes.iter().filter(|s| s.volume("volume").is_some()) {
             let size = shape.state.world_bounds().size().length();
             if size / plan.step > MOST_SEGMENTS {
                 return Err(ActionError::Limit {
@@ -50,15 +54,15 @@ fn distance(shapes: &[&ResolvedShape], settings: &Settings) -> f64 {
     settings.sample_distance.unwrap_or(if smallest.is_finite() { smallest / 2.0 } else { 1.0 })
 }
 
-/// Whether the `over` shapes need the plain way: they may overlap, or are no plain tables.
-pub fn uses_general(drawn: &[&ResolvedShape]) -> bool {
-    let over: Vec<_> = drawn.iter().filter(|s| s.compositing() == Compositing::Over).collect();
-    let plain = |s: &ResolvedShape| match s.table("lookup_table") {
-        Some(table) => table.interpolation() == TableInterpolation::Pre,
-        None => true,
+/// The `over` shapes whose boxes overlap that of another.
+fn mixed(drawn: &[&ResolvedShape]) -> Vec<u64> {
+    let dense = |s: &&&ResolvedShape| {
+        s.compositing() == Compositing::Over && s.state.geometry.slices().is_none_or(|slices| slices.volume)
     };
-    let bounds: Vec<_> = over.iter().map(|s| s.world_block()).collect();
+    let boxes: Vec<(u64, Aabb)> = drawn.iter().filter(dense).map(|s| (s.id, s.world_block())).collect();
     let apart = |a: &Aabb, b: &Aabb| (0..3).any(|i| a.max[i] <= b.min[i] || b.max[i] <= a.min[i]);
-    let overlap = bounds.iter().enumerate().any(|(i, a)| bounds[..i].iter().any(|b| !apart(a, b)));
-    overlap || over.iter().any(|s| plain(s))
+    let meets = |(id, own): &(u64, Aabb)| boxes.iter().any(|(other, b)| other != id && !apart(own, b));
+    let mut mixed: Vec<u64> = boxes.iter().filter(|b| meets(b)).map(|(id, _)| *id).collect();
+    mixed.sort_unstable();
+    mixed
 }

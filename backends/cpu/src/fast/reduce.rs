@@ -2,6 +2,8 @@
 #![expect(unsafe_code, reason = "kernels of a vector unit")]
 #![expect(clippy::needless_range_loop, reason = "a lane indexes several arrays")]
 
+use std::marker::PhantomData;
+
 use volact_core::{Compositing, lattice::Lattice};
 
 use super::{
@@ -9,7 +11,7 @@ use super::{
     fetch::{Base, Fetch, Voxels},
     packet::Packet,
     simd::{LANES, Simd},
-    walk::{ALL, CHUNK, Counts, Kernel, around, walk},
+    walk::{ALL, CHUNK, Counts, Kernel, Positions, around, walk},
 };
 
 /// One shape to reduce.
@@ -69,15 +71,15 @@ pub unsafe fn reduce<S: Simd, F: Fetch>(
     unsafe {
         match job.compositing {
             Compositing::Maximum | Compositing::Minimum => {
-                let mut kernel = Extreme::<S>::new(job, out);
+                let mut kernel = Extreme::<S, F>::new(job, out);
                 let blocks = job.peaks.map(|p| p.blocks);
-                walk::<S, F, _>(&mut kernel, (&job.voxels, packet, &cuts), step, blocks, 0, counts);
+                walk::<S, _>(&mut kernel, (&job.voxels, packet, &cuts), step, blocks, 0, counts);
                 kernel.finish(out);
             }
             _ => {
-                let mut kernel = Sum::<S>::new(job);
+                let mut kernel = Sum::<S, F>::new(job);
                 let blocks = job.empty.map(|e| e.blocks);
-                walk::<S, F, _>(&mut kernel, (&job.voxels, packet, &cuts), step, blocks, 0, counts);
+                walk::<S, _>(&mut kernel, (&job.voxels, packet, &cuts), step, blocks, 0, counts);
                 for l in 0..LANES {
                     let whole = cuts.to[l] - cuts.from[l] - f64::from(kernel.missing[l]);
                     out[l].value += kernel.total[l] * step;
@@ -88,7 +90,8 @@ pub unsafe fn reduce<S: Simd, F: Fetch>(
     }
 }
 
-fn merge(into: &mut Reduced, compositing: Compositing, number: f32, length: f64) {
+/// Adds a number that holds over a length.
+pub fn merge(into: &mut Reduced, compositing: Compositing, number: f32, length: f64) {
     if number.is_nan() {
         return;
     }
@@ -127,15 +130,16 @@ unsafe fn numbers<S: Simd, F: Fetch>(job: &Job<'_>, packet: &Packet, cut: &[[f64
 }
 
 /// Maximum; a minimum is the maximum of the negated numbers.
-struct Extreme<'a, S: Simd> {
+struct Extreme<'a, S: Simd, F: Fetch> {
     job: &'a Job<'a>,
+    voxels: PhantomData<F>,
     sign: f32,
     best: S::F,
     /// The number that cannot be passed.
     limit: f32,
 }
 
-impl<'a, S: Simd> Extreme<'a, S> {
+impl<'a, S: Simd, F: Fetch> Extreme<'a, S, F> {
     #[inline(always)]
     unsafe fn new(job: &'a Job<'a>, ends: &[Reduced; LANES]) -> Self {
         let sign = if job.compositing == Compositing::Maximum { 1.0 } else { -1.0 };
@@ -143,7 +147,7 @@ impl<'a, S: Simd> Extreme<'a, S> {
         let range = job.range.filter(|_| !job.voxels.scalar.is_float());
         let limit = range.map_or(f32::INFINITY, |[lo, hi]| if sign > 0.0 { hi } else { -lo });
         // SAFETY: the caller's promises.
-        unsafe { Self { job, sign, best: S::load(&best), limit } }
+        unsafe { Self { job, voxels: PhantomData, sign, best: S::load(&best), limit } }
     }
 
     #[inline(always)]
@@ -159,18 +163,18 @@ impl<'a, S: Simd> Extreme<'a, S> {
     }
 }
 
-impl<S: Simd> Kernel<S> for Extreme<'_, S> {
+impl<S: Simd, F: Fetch> Kernel<S> for Extreme<'_, S, F> {
     const AT: f64 = 0.5;
 
     #[inline(always)]
-    unsafe fn start(&mut self, _: S::F) {}
+    unsafe fn start(&mut self, _: Positions<'_, S>) {}
 
     #[inline(always)]
-    unsafe fn take(&mut self, value: S::F, live: u32, _: usize) {
+    unsafe fn take(&mut self, (base, p): Positions<'_, S>, live: u32, _: usize) {
         // SAFETY: the caller's promises.
         unsafe {
             // `max` gives its second argument where the first is NaN.
-            let value = S::mul(value, S::splat(self.sign));
+            let value = S::mul(F::fetch::<S>(&self.job.voxels, base, p), S::splat(self.sign));
             self.best = S::select(live, S::max(value, self.best), self.best);
         }
     }
@@ -194,7 +198,7 @@ impl<S: Simd> Kernel<S> for Extreme<'_, S> {
     }
 }
 
-impl<S: Simd> Extreme<'_, S> {
+impl<S: Simd, F: Fetch> Extreme<'_, S, F> {
     /// Lanes whose best number no value around their block passes. Bounds are taken a
     /// ten-thousandth wider, so that rounding here cannot make them narrower than they are.
     #[inline(always)]
@@ -210,33 +214,35 @@ impl<S: Simd> Extreme<'_, S> {
 }
 
 /// Sum over whole segments.
-struct Sum<'a, S: Simd> {
+struct Sum<'a, S: Simd, F: Fetch> {
     job: &'a Job<'a>,
+    voxels: PhantomData<F>,
     chunk: S::F,
     total: [f64; LANES],
     missing: [u32; LANES],
     rows: usize,
 }
 
-impl<'a, S: Simd> Sum<'a, S> {
+impl<'a, S: Simd, F: Fetch> Sum<'a, S, F> {
     #[inline(always)]
     unsafe fn new(job: &'a Job<'a>) -> Self {
         // SAFETY: the caller's promises.
         let chunk = unsafe { S::splat(0.0) };
-        Self { job, chunk, total: [0.0; LANES], missing: [0; LANES], rows: 0 }
+        Self { job, voxels: PhantomData, chunk, total: [0.0; LANES], missing: [0; LANES], rows: 0 }
     }
 }
 
-impl<S: Simd> Kernel<S> for Sum<'_, S> {
+impl<S: Simd, F: Fetch> Kernel<S> for Sum<'_, S, F> {
     const AT: f64 = 0.5;
 
     #[inline(always)]
-    unsafe fn start(&mut self, _: S::F) {}
+    unsafe fn start(&mut self, _: Positions<'_, S>) {}
 
     #[inline(always)]
-    unsafe fn take(&mut self, value: S::F, live: u32, _: usize) {
+    unsafe fn take(&mut self, (base, p): Positions<'_, S>, live: u32, _: usize) {
         // SAFETY: the caller's promises.
         unsafe {
+            let value = F::fetch::<S>(&self.job.voxels, base, p);
             let mut live = live;
             if self.job.voxels.scalar.is_float() {
                 let nan = S::nan_bits(value) & live;

@@ -9,7 +9,7 @@
 
 use super::{
     bounds::BLOCK,
-    fetch::{Base, Fetch, Voxels},
+    fetch::{Base, Voxels},
     packet::{Cuts, Packet},
     simd::{LANES, Simd},
 };
@@ -43,20 +43,24 @@ impl Counts {
     }
 }
 
+/// Sixteen positions relative to a base.
+pub type Positions<'a, S> = (&'a Base, [<S as Simd>::F; 3]);
+
 /// What is made of the samples.
 ///
 /// # Safety
-/// Functions keep the contract of [`Simd`].
+/// Functions keep the contract of [`Simd`]; positions were made for the voxels that the kernel
+/// reads.
 #[expect(clippy::missing_safety_doc, reason = "the contract stands above")]
 pub trait Kernel<S: Simd> {
     /// Where in a segment its position lies: 0.5, or 0 where the kernel takes both ends.
     const AT: f64;
 
-    /// Takes the number at a segment's front, before a run of segments; only where `AT` is 0.
-    unsafe fn start(&mut self, value: S::F);
+    /// Takes a segment's front, before a run of segments; only where `AT` is 0.
+    unsafe fn start(&mut self, at: Positions<'_, S>);
 
-    /// Takes the number of segment `row` of the chunk in the lanes of `live`.
-    unsafe fn take(&mut self, value: S::F, live: u32, row: usize);
+    /// Takes segment `row` of the chunk in the lanes of `live`.
+    unsafe fn take(&mut self, at: Positions<'_, S>, live: u32, row: usize);
 
     /// Ends the chunk that begins with segment `first`; returns the lanes that are done.
     unsafe fn end(&mut self, first: i64) -> u32;
@@ -88,9 +92,9 @@ pub type Blocks = Option<[usize; 3]>;
 /// Visits all whole segments of a packet, but for lanes that are done.
 ///
 /// # Safety
-/// Called from a function compiled for `S` on a machine that has it; `F` is the voxels' access.
+/// Called from a function compiled for `S` on a machine that has it, with the kernel's voxels.
 #[inline(always)]
-pub unsafe fn walk<S: Simd, F: Fetch, K: Kernel<S>>(
+pub unsafe fn walk<S: Simd, K: Kernel<S>>(
     kernel: &mut K,
     (voxels, packet, cuts): (&Voxels<'_>, &Packet, &Cuts),
     step: f64,
@@ -111,9 +115,42 @@ pub unsafe fn walk<S: Simd, F: Fetch, K: Kernel<S>>(
                 return;
             }
             let end = (last - chunk).min(CHUNK as i64) as usize;
-            k = chunk + rows.visit::<F, K>(kernel, voxels, (k - chunk) as usize, end, blocks, counts) as i64;
+            k = chunk + rows.visit(kernel, (k - chunk) as usize, end, blocks, counts) as i64;
             rows.done |= kernel.end(chunk);
         }
+    }
+}
+
+/// Visits the whole segments of a packet in the chunk that begins with segment `chunk`, but for
+/// lanes that are done; returns the next segment in which there may be something.
+///
+/// # Safety
+/// As [`walk`].
+#[inline(always)]
+pub unsafe fn walk_chunk<S: Simd, K: Kernel<S>>(
+    kernel: &mut K,
+    (voxels, packet, cuts): (&Voxels<'_>, &Packet, &Cuts),
+    (step, chunk): (f64, i64),
+    blocks: Blocks,
+    done: u32,
+    counts: &mut Counts,
+) -> i64 {
+    let Some([first, last]) = cuts.whole() else { return i64::MAX };
+    if last <= chunk {
+        return i64::MAX;
+    }
+    let start = first.max(chunk);
+    if start >= chunk + CHUNK as i64 {
+        return start;
+    }
+    // SAFETY: the caller's promises.
+    unsafe {
+        let mut rows = Rows::<S>::new(voxels, packet, cuts, step, first);
+        rows.done = done;
+        rows.begin::<K>(voxels, packet, step, chunk, chunk - first);
+        let end = (last - chunk).min(CHUNK as i64) as usize;
+        let next = chunk + rows.visit(kernel, (start - chunk) as usize, end, blocks, counts) as i64;
+        if next >= last { i64::MAX } else { next }
     }
 }
 
@@ -220,10 +257,9 @@ impl<S: Simd> Rows<S> {
     /// Takes rows `first..end`; returns the row after those that are known to be empty, too, which
     /// may lie behind `end`.
     #[inline(always)]
-    unsafe fn visit<F: Fetch, K: Kernel<S>>(
+    unsafe fn visit<K: Kernel<S>>(
         &self,
         kernel: &mut K,
-        voxels: &Voxels<'_>,
         first: usize,
         end: usize,
         blocks: Blocks,
@@ -243,15 +279,14 @@ impl<S: Simd> Rows<S> {
                     }
                 }
                 if K::AT == 0.0 && fresh {
-                    kernel.start(F::fetch::<S>(voxels, &self.base, self.at(row as f32)));
+                    kernel.start((&self.base, self.at(row as f32)));
                     fresh = false;
                 }
                 let stop = if blocks.is_some() { (row + GROUP).min(end) } else { end };
                 while row < stop {
                     let live = self.live(row);
                     let at = row as f32 + if K::AT == 0.0 { 1.0 } else { 0.0 };
-                    let value = F::fetch::<S>(voxels, &self.base, self.at(at));
-                    kernel.take(value, live, row);
+                    kernel.take((&self.base, self.at(at)), live, row);
                     counts.samples += u64::from(live.count_ones());
                     row += 1;
                 }

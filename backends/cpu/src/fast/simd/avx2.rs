@@ -67,6 +67,10 @@ impl Simd for Avx2 {
         both!(|a, b| _mm256_mul_ps(a, b))
     }
     #[inline(always)]
+    unsafe fn div(a: Self::F, b: Self::F) -> Self::F {
+        both!(|a, b| _mm256_div_ps(a, b))
+    }
+    #[inline(always)]
     unsafe fn fma(a: Self::F, b: Self::F, c: Self::F) -> Self::F {
         both!(|a, b, c| _mm256_fmadd_ps(a, b, c))
     }
@@ -85,6 +89,11 @@ impl Simd for Avx2 {
     #[inline(always)]
     unsafe fn lt_bits(a: Self::F, b: Self::F) -> u32 {
         let m = both!(|a, b| _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LT_OQ>(a, b)));
+        m[0] as u32 | (m[1] as u32) << 8
+    }
+    #[inline(always)]
+    unsafe fn eq_bits(a: Self::F, b: Self::F) -> u32 {
+        let m = both!(|a, b| _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_EQ_OQ>(a, b)));
         m[0] as u32 | (m[1] as u32) << 8
     }
     #[inline(always)]
@@ -177,6 +186,36 @@ impl Simd for Avx2 {
         // SAFETY: as above.
         let m = unsafe { Self::mask(bits) };
         both!(|m, a, b| _mm256_blendv_epi8(b, a, _mm256_castps_si256(m)))
+    }
+    #[inline(always)]
+    unsafe fn eq_int_bits(a: Self::I, b: Self::I) -> u32 {
+        let m = both!(|a, b| _mm256_movemask_ps(_mm256_castsi256_ps(_mm256_cmpeq_epi32(a, b))));
+        m[0] as u32 | (m[1] as u32) << 8
+    }
+    #[inline(always)]
+    unsafe fn as_int(a: Self::F) -> Self::I {
+        both!(|a| _mm256_castps_si256(a))
+    }
+    #[inline(always)]
+    unsafe fn rows(base: *const u8, index: &[i32; LANES]) -> [Self::F; 4] {
+        // SAFETY: the caller's rows can be read.
+        unsafe {
+            let row = |l: usize| _mm_loadu_ps(base.add(16 * index[l] as u32 as usize).cast());
+            let half = |first: usize| {
+                let two = |e: usize| _mm256_set_m128(row(first + 4 + e), row(first + e));
+                let (a, b, c, d) = (two(0), two(1), two(2), two(3));
+                let pair = |a: __m256, b: __m256| [_mm256_unpacklo_ps(a, b), _mm256_unpackhi_ps(a, b)];
+                let ([p, q], [r, s]) = (pair(a, b), pair(c, d));
+                let double = |a: __m256, b: __m256| {
+                    let (a, b) = (_mm256_castps_pd(a), _mm256_castps_pd(b));
+                    [_mm256_castpd_ps(_mm256_unpacklo_pd(a, b)), _mm256_castpd_ps(_mm256_unpackhi_pd(a, b))]
+                };
+                let ([first, second], [third, fourth]) = (double(p, r), double(q, s));
+                [first, second, third, fourth]
+            };
+            let (low, high) = (half(0), half(8));
+            [0, 1, 2, 3].map(|i| [low[i], high[i]])
+        }
     }
     #[inline(always)]
     unsafe fn as_float(a: Self::I) -> Self::F {

@@ -33,6 +33,7 @@ impl Simd for Avx512 {
         fn add(a: __m512, b: __m512) -> __m512 { _mm512_add_ps(a, b) }
         fn sub(a: __m512, b: __m512) -> __m512 { _mm512_sub_ps(a, b) }
         fn mul(a: __m512, b: __m512) -> __m512 { _mm512_mul_ps(a, b) }
+        fn div(a: __m512, b: __m512) -> __m512 { _mm512_div_ps(a, b) }
         fn fma(a: __m512, b: __m512, c: __m512) -> __m512 { _mm512_fmadd_ps(a, b, c) }
         fn min(a: __m512, b: __m512) -> __m512 { _mm512_min_ps(a, b) }
         fn max(a: __m512, b: __m512) -> __m512 { _mm512_max_ps(a, b) }
@@ -40,6 +41,7 @@ impl Simd for Avx512 {
             _mm512_mask_blend_ps(_mm512_cmp_ps_mask::<_CMP_EQ_OQ>(t, _mm512_setzero_ps()), b, a)
         }
         fn lt_bits(a: __m512, b: __m512) -> u32 { u32::from(_mm512_cmp_ps_mask::<_CMP_LT_OQ>(a, b)) }
+        fn eq_bits(a: __m512, b: __m512) -> u32 { u32::from(_mm512_cmp_ps_mask::<_CMP_EQ_OQ>(a, b)) }
         fn nan_bits(a: __m512) -> u32 { u32::from(_mm512_cmp_ps_mask::<_CMP_UNORD_Q>(a, a)) }
         fn select(bits: u32, a: __m512, b: __m512) -> __m512 { _mm512_mask_blend_ps(bits as u16, b, a) }
         fn floor(a: __m512) -> __m512 { _mm512_roundscale_ps::<9>(a) }
@@ -59,9 +61,35 @@ impl Simd for Avx512 {
         fn shl<const N>(a: __m512i) -> __m512i { _mm512_slli_epi32::<N>(a) }
         fn shr_by(a: __m512i, bits: __m512i) -> __m512i { _mm512_srlv_epi32(a, bits) }
         fn select_int(bits: u32, a: __m512i, b: __m512i) -> __m512i { _mm512_mask_blend_epi32(bits as u16, b, a) }
+        fn eq_int_bits(a: __m512i, b: __m512i) -> u32 { u32::from(_mm512_cmpeq_epi32_mask(a, b)) }
+        fn as_int(a: __m512) -> __m512i { _mm512_castps_si512(a) }
         fn as_float(a: __m512i) -> __m512 { _mm512_castsi512_ps(a) }
         fn gather(base: *const u8, offset: __m512i) -> __m512i {
             _mm512_i32gather_epi32::<1>(offset, base.cast())
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn rows(base: *const u8, index: &[i32; LANES]) -> [__m512; 4] {
+        // SAFETY: the caller's rows can be read.
+        unsafe {
+            let row = |l: usize| _mm_loadu_ps(base.add(16 * index[l] as u32 as usize).cast());
+            // Every fourth lane, so that turning each block of four by four gives lanes in order.
+            let four = |e: usize| {
+                let v = _mm512_castps128_ps512(row(e));
+                let v = _mm512_mask_broadcast_f32x4(v, 0x00f0, row(4 + e));
+                let v = _mm512_mask_broadcast_f32x4(v, 0x0f00, row(8 + e));
+                _mm512_mask_broadcast_f32x4(v, 0xf000, row(12 + e))
+            };
+            let (a, b, c, d) = (four(0), four(1), four(2), four(3));
+            let pair = |a: __m512, b: __m512| [_mm512_unpacklo_ps(a, b), _mm512_unpackhi_ps(a, b)];
+            let ([p, q], [r, s]) = (pair(a, b), pair(c, d));
+            let double = |a: __m512, b: __m512| {
+                let (a, b) = (_mm512_castps_pd(a), _mm512_castps_pd(b));
+                [_mm512_castpd_ps(_mm512_unpacklo_pd(a, b)), _mm512_castpd_ps(_mm512_unpackhi_pd(a, b))]
+            };
+            let ([first, second], [third, fourth]) = (double(p, r), double(q, s));
+            [first, second, third, fourth]
         }
     }
 

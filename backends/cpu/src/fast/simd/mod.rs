@@ -100,6 +100,8 @@ pub trait Simd: Copy + 'static {
     unsafe fn sub(a: Self::F, b: Self::F) -> Self::F;
     /// a · b.
     unsafe fn mul(a: Self::F, b: Self::F) -> Self::F;
+    /// a / b.
+    unsafe fn div(a: Self::F, b: Self::F) -> Self::F;
     /// a · b + c, rounded once (twice on plain x86-64).
     unsafe fn fma(a: Self::F, b: Self::F, c: Self::F) -> Self::F;
     /// The smaller; `b` where `a` is NaN.
@@ -110,6 +112,8 @@ pub trait Simd: Copy + 'static {
     unsafe fn where_zero(t: Self::F, a: Self::F, b: Self::F) -> Self::F;
     /// Bit *l* set where lane *l* of `a` is below that of `b`.
     unsafe fn lt_bits(a: Self::F, b: Self::F) -> u32;
+    /// Bit *l* set where lane *l* of both is equal.
+    unsafe fn eq_bits(a: Self::F, b: Self::F) -> u32;
     /// Bit *l* set where lane *l* is NaN.
     unsafe fn nan_bits(a: Self::F) -> u32;
     /// `a` in the lanes whose bit is set, else `b`.
@@ -149,8 +153,15 @@ pub trait Simd: Copy + 'static {
     unsafe fn shr_by(a: Self::I, bits: Self::I) -> Self::I;
     /// `a` in the lanes whose bit is set, else `b`.
     unsafe fn select_int(bits: u32, a: Self::I, b: Self::I) -> Self::I;
+    /// Bit *l* set where lane *l* of both is equal.
+    unsafe fn eq_int_bits(a: Self::I, b: Self::I) -> u32;
     /// The same bits as f32.
     unsafe fn as_float(a: Self::I) -> Self::F;
+    /// The same bits as i32.
+    unsafe fn as_int(a: Self::F) -> Self::I;
+    /// Four f32 at `base + 16·index` of every lane, which must be readable: all first ones, all
+    /// second ones, and so on. Indices are unsigned.
+    unsafe fn rows(base: *const u8, index: &[i32; LANES]) -> [Self::F; 4];
     /// Four bytes at each byte offset, unaligned.
     unsafe fn gather(base: *const u8, offset: Self::I) -> Self::I;
 

@@ -47,6 +47,10 @@ impl Simd for Plain {
         lanes!(|i| a[i] * b[i])
     }
     #[inline(always)]
+    unsafe fn div(a: Self::F, b: Self::F) -> Self::F {
+        lanes!(|i| a[i] / b[i])
+    }
+    #[inline(always)]
     unsafe fn fma(a: Self::F, b: Self::F, c: Self::F) -> Self::F {
         lanes!(|i| fused(a[i], b[i], c[i]))
     }
@@ -65,6 +69,10 @@ impl Simd for Plain {
     #[inline(always)]
     unsafe fn lt_bits(a: Self::F, b: Self::F) -> u32 {
         (0..LANES).fold(0, |bits, i| bits | u32::from(a[i] < b[i]) << i)
+    }
+    #[inline(always)]
+    unsafe fn eq_bits(a: Self::F, b: Self::F) -> u32 {
+        (0..LANES).fold(0, |bits, i| bits | u32::from(a[i] == b[i]) << i)
     }
     #[inline(always)]
     unsafe fn nan_bits(a: Self::F) -> u32 {
@@ -144,6 +152,21 @@ impl Simd for Plain {
     #[inline(always)]
     unsafe fn select_int(bits: u32, a: Self::I, b: Self::I) -> Self::I {
         lanes!(|i| if bits >> i & 1 == 1 { a[i] } else { b[i] })
+    }
+    #[inline(always)]
+    unsafe fn eq_int_bits(a: Self::I, b: Self::I) -> u32 {
+        (0..LANES).fold(0, |bits, i| bits | u32::from(a[i] == b[i]) << i)
+    }
+    #[inline(always)]
+    unsafe fn as_int(a: Self::F) -> Self::I {
+        lanes!(|i| a[i].to_bits() as i32)
+    }
+    #[inline(always)]
+    unsafe fn rows(base: *const u8, index: &[i32; LANES]) -> [Self::F; 4] {
+        // SAFETY: the caller's rows can be read.
+        let row = |i: usize| unsafe { base.add(16 * index[i] as u32 as usize).cast::<[f32; 4]>().read_unaligned() };
+        let rows: [[f32; 4]; LANES] = map(row);
+        [0, 1, 2, 3].map(|c| lanes!(|i| rows[i][c]))
     }
     #[inline(always)]
     unsafe fn as_float(a: Self::I) -> Self::F {

@@ -1,0 +1,307 @@
+//! A shape, ready to be drawn: where it is, what is seen of it, and the planes on which it is cut.
+
+use std::ops::ControlFlow;
+
+use volact_core::{
+    Aabb, Attribute, Clip, LookupTable, Plane, SliceStyle, geometry::Spans, glam::DVec3, lattice::Lattice,
+    resolve::ResolvedShape, table::ResolvedTable,
+};
+
+use super::{
+    bent::{Bend, Bent},
+    dispatch,
+    medium::Medium,
+    mesh::{build::Linked, trace::Crossing},
+    options::Settings,
+    over,
+    packet::{Bundle, Packet, Place, Span, Vectors},
+    resources::{Prepared, Resources, voxels},
+    simd::{LANES, Unit},
+    stretches::Stretches,
+    sweep::piece::{Hit, Piece, Run, cut},
+};
+
+/// Where a shape is.
+#[derive(Clone, Copy, Debug)]
+pub struct Region<'a> {
+    /// Maps, and the box around it.
+    pub place: Place,
+    clip: &'a Clip,
+    scene: &'a Clip,
+    /// The mesh that it is, unless it is a box.
+    mesh: Option<&'a Linked>,
+    /// How the mesh carries the volume along.
+    bend: Option<Bend<'a>>,
+}
+
+/// Sixteen rays where they are in a region.
+#[derive(Debug)]
+pub struct Aimed {
+    /// In sample space, from the first entry to the last exit.
+    pub packet: Packet,
+    /// Where they are inside.
+    pub stretches: Stretches,
+    /// The way through sample space, where it is not straight.
+    pub bent: Option<Box<Bent>>,
+}
+
+impl<'a> Region<'a> {
+    /// The region of a resolved shape; `None` where there is nothing of it.
+    pub fn new(shape: &'a ResolvedShape, scene: &'a Clip, resources: &'a Resources) -> Option<Self> {
+        let texture = shape.volume("volume");
+        let mesh = match resources.prepared(shape) {
+            Some(Prepared::Solid(solid)) => Some(solid),
+            _ => None,
+        };
+        let bend = mesh.and_then(|m| m.texture.as_ref()).zip(texture).map(|(points, texture)| {
+            let roi = texture.data_roi();
+            let vector = |v: [usize; 3]| DVec3::from_array(v.map(|v| v as f64));
+            Bend { texture: points, first: vector(roi.min), size: vector(roi.max) - vector(roi.min) }
+        });
+        let bounds = shape.state.geometry.bounds();
+        let block = match (shape.state.geometry.as_block(), texture) {
+            (Some(block), Some(texture)) if mesh.is_none() => block.intersection(&texture.geometry_roi()),
+            (_, Some(texture)) if bend.is_none() => grown(&bounds).intersection(&texture.geometry_roi()),
+            _ => grown(&bounds),
+        };
+        if block.is_empty() {
+            return None;
+        }
+        let to_index = texture.map(|t| t.object_to_index()).unwrap_or_default();
+        let place = Place { to_object: shape.to_object, to_index, block };
+        Some(Self { place, clip: &shape.state.clip, scene, mesh: mesh.map(|m| &m.linked), bend })
+    }
+
+    /// Whether rays are straight in sample space and stay inside from one end to the other.
+    pub fn is_bent(&self) -> bool {
+        self.bend.is_some()
+    }
+
+    /// The rays of a bundle where `span` and this region hold them; `None` where they miss it.
+    pub fn aim(&self, unit: Unit, bundle: &Bundle, span: &Span) -> Option<Aimed> {
+        let packet = dispatch::aim(unit, bundle, span, &self.place);
+        if packet.active == 0 {
+            return None;
+        }
+        let mut bent = self.bend.map(|_| Box::<Bent>::default());
+        let mut stretches = match self.mesh {
+            Some(mesh) => self.inside(mesh, bundle, &packet, bent.as_deref_mut()),
+            None => Stretches::one(packet.span()),
+        };
+        self.clip(bundle, &mut stretches);
+        (stretches.active() != 0).then_some(Aimed { packet, stretches, bent })
+    }
+
+    /// Takes away what is clipped.
+    pub fn clip(&self, bundle: &Bundle, stretches: &mut Stretches) {
+        if !self.clip.is_none() {
+            stretches.clip(self.clip, &bundle.through(&self.place.to_object));
+        }
+        if !self.scene.is_none() {
+            stretches.clip(self.scene, &[bundle.origin, bundle.direction]);
+        }
+    }
+
+    fn inside(&self, mesh: &Linked, bundle: &Bundle, packet: &Packet, bent: Option<&mut Bent>) -> Stretches {
+        let mut bent = bent.zip(self.bend);
+        let rays = bundle.through(&self.place.to_object);
+        let mut lanes: [Spans; LANES] = Default::default();
+        for (l, spans) in lanes.iter_mut().enumerate().filter(|(l, _)| packet.active >> l & 1 == 1) {
+            let (ray, span) = (lane(&rays, l), [packet.start[l], packet.end[l]]);
+            *spans = match &mut bent {
+                Some((bent, bend)) => bent.follow(l, mesh, bend, ray, span),
+                None => mesh.stretches(ray[0], ray[1], span),
+            };
+        }
+        Stretches::of_lanes(|l| lanes[l].as_slice())
+    }
+}
+
+/// A box that certainly holds what lies on its faces.
+fn grown(bounds: &Aabb) -> Aabb {
+    let reach = bounds.min.abs().max(bounds.max.abs());
+    let margin = bounds.size() * 1e-9 + reach * 1e-12 + DVec3::splat(f64::MIN_POSITIVE);
+    Aabb::new(bounds.min - margin, bounds.max + margin)
+}
+
+/// A lane's point at `t = 0` and direction.
+pub fn lane([origin, direction]: &[Vectors; 2], l: usize) -> [DVec3; 2] {
+    [origin, direction].map(|v| DVec3::new(v[0][l], v[1][l], v[2][l]))
+}
+
+/// Numbers at a mesh's vertices and how they are classified.
+#[derive(Debug)]
+pub struct Field<'a> {
+    mesh: &'a Linked,
+    color: Classified<'a>,
+    opacity: Option<Classified<'a>>,
+    unit: f64,
+}
+
+/// One number a vertex, and a table for it.
+#[derive(Debug)]
+struct Classified<'a> {
+    attribute: &'a Attribute,
+    component: usize,
+    table: ResolvedTable,
+}
+
+impl<'a> Classified<'a> {
+    fn new(attribute: &'a Attribute, component: usize, table: &LookupTable) -> Self {
+        let range = attribute.range(component).unwrap_or([0.0, 1.0]);
+        Self { attribute, component, table: table.resolve(range) }
+    }
+
+    fn value(&self, vertex: usize) -> f64 {
+        self.attribute.value(vertex, self.component)
+    }
+}
+
+impl<'a> Field<'a> {
+    /// The field of a shape with the shader `attribute`.
+    pub fn new(shape: &'a ResolvedShape, mesh: &'a Linked) -> Option<Self> {
+        let component = shape.int("component").unwrap_or(0) as usize;
+        let (scalars, table) = (shape.attribute("scalars")?, shape.table("lookup_table")?);
+        let (other, other_table) = (shape.attribute("opacity_scalars"), shape.table("opacity_table"));
+        let opacity = (other.is_some() || other_table.is_some()).then(|| {
+            let (attribute, component) = other.map_or((scalars, component), |a| (a, 0));
+            Classified::new(attribute, component, other_table.unwrap_or(table))
+        });
+        let color = Classified::new(scalars, component, table);
+        Some(Self { mesh, color, opacity, unit: shape.float("unit_distance")? })
+    }
+
+    /// Adds the pieces of a ray, given in object space, on one stretch.
+    pub fn pieces(&self, [origin, direction]: [DVec3; 2], span: [f64; 2], cuts: &mut Vec<f64>, out: &mut Vec<Piece>) {
+        self.mesh.trace(origin, direction, span, |crossing| {
+            let value = |of: &Classified<'_>| crossing.interpolate(|v| of.value(v));
+            let color = Run { value: value(&self.color), table: &self.color.table };
+            let opacity = self.opacity.as_ref().map(|of| Run { value: value(of), table: &of.table });
+            let known = |run: &Run<'_>| run.value.iter().all(|v| !v.is_nan());
+            if known(&color) && opacity.as_ref().is_none_or(known) {
+                cut(crossing.span, color, opacity, self.unit, cuts, out);
+            }
+            ControlFlow::Continue(())
+        });
+    }
+
+    /// Straight colour and opacity at `t` of a ray in object space; `None` where there is no number.
+    fn at(&self, [origin, direction]: [DVec3; 2], t: f64) -> Option<[f64; 4]> {
+        let near = 1e-9 * t.abs() + f64::MIN_POSITIVE;
+        let mut best: Option<(f64, Crossing)> = None;
+        self.mesh.trace(origin, direction, [t - near, t + near], |crossing| {
+            let [a, b] = crossing.span;
+            let off = (a - t).max(t - b).max(0.0);
+            if best.is_none_or(|(least, _)| off < least) {
+                best = Some((off, *crossing));
+            }
+            ControlFlow::Continue(())
+        });
+        let weights = best?.1.weights_at(t);
+        let vertices = best?.1.vertices;
+        let rgba = |of: &Classified<'_>| {
+            let value: f64 = (0..4).map(|i| weights[i] * of.value(vertices[i] as usize)).sum();
+            (!value.is_nan()).then(|| of.table.classify(value))
+        };
+        let [r, g, b, a] = rgba(&self.color)?;
+        let a = self.opacity.as_ref().map_or(Some(a), |of| Some(rgba(of)?[3]))?;
+        Some([r, g, b, a])
+    }
+}
+
+/// What is seen inside a region.
+#[derive(Debug)]
+pub enum Content<'a> {
+    /// Voxels on the lattice.
+    Voxels(Box<over::Job<'a>>),
+    /// Numbers at a mesh's vertices.
+    Field(Field<'a>),
+}
+
+/// Planes on which a shape is cut.
+#[derive(Debug)]
+struct Slicing<'a> {
+    planes: &'a [Plane],
+    style: SliceStyle,
+    medium: Option<Medium<'a>>,
+}
+
+/// An `over` shape, ready to be drawn.
+#[derive(Debug)]
+pub struct Part<'a> {
+    /// The shape's identity: sums are made in this order.
+    pub id: u64,
+    /// Where it is.
+    pub region: Region<'a>,
+    /// What is seen of it.
+    pub content: Content<'a>,
+    /// Whether it is seen between its planes, too.
+    pub volume: bool,
+    slicing: Option<Slicing<'a>>,
+}
+
+impl<'a> Part<'a> {
+    /// A part of a resolved `over` shape; `None` where nothing of it can be seen.
+    pub fn new(
+        shape: &'a ResolvedShape,
+        scene: &'a Clip,
+        resources: &'a Resources,
+        (lattice, settings, threshold): (Lattice, &Settings, f32),
+    ) -> Option<Self> {
+        let region = Region::new(shape, scene, resources)?;
+        let (content, medium) = match shape.volume("volume") {
+            Some(texture) => {
+                let tables = resources.tables(shape.id)?;
+                let job = over::Job {
+                    unit: settings.unit,
+                    voxels: voxels(shape, texture).0,
+                    lattice,
+                    classes: tables.classes(),
+                    empty: tables.empty.as_ref(),
+                    termination: settings.termination as f32,
+                    threshold,
+                };
+                (Content::Voxels(Box::new(job)), Some(Medium::new(shape, texture)))
+            }
+            None => (Content::Field(Field::new(shape, region.mesh?)?), None),
+        };
+        let slices = shape.state.geometry.slices();
+        let slicing = slices.map(|s| Slicing { planes: &s.planes, style: s.style, medium });
+        Some(Self { id: shape.id, region, content, volume: slices.is_none_or(|s| s.volume), slicing })
+    }
+
+    /// Whether it has planes.
+    pub fn is_sliced(&self) -> bool {
+        self.slicing.is_some()
+    }
+
+    /// Adds the hits of rays on this part's planes to those of each lane.
+    pub fn slice(&self, bundle: &Bundle, aimed: &Aimed, hits: &mut [Vec<Hit>; LANES]) {
+        let Some(slicing) = &self.slicing else { return };
+        let rays = bundle.through(&self.region.place.to_object);
+        for (l, hits) in hits.iter_mut().enumerate().filter(|(l, _)| aimed.stretches.active() >> l & 1 == 1) {
+            let ray = lane(&rays, l);
+            for plane in slicing.planes {
+                let Some(t) = plane.meets(ray[0], ray[1]).filter(|&t| aimed.stretches.holds(l, t)) else { continue };
+                let rgba = match (&slicing.medium, &self.content) {
+                    (Some(medium), _) => medium.at(self.sample(aimed, l, t)),
+                    (None, Content::Field(field)) => field.at(ray, t),
+                    _ => None,
+                };
+                let Some([r, g, b, a]) = rgba else { continue };
+                let a = if slicing.style == SliceStyle::Opaque { 1.0 } else { a };
+                if a > 0.0 {
+                    hits.push(Hit { t, color: [r * a, g * a, b * a, a] });
+                }
+            }
+        }
+    }
+
+    /// Sample coordinates.
+    fn sample(&self, aimed: &Aimed, l: usize, t: f64) -> DVec3 {
+        match &aimed.bent {
+            Some(bent) => bent.at(l, t),
+            None => DVec3::from_array(aimed.packet.at(l, t)),
+        }
+    }
+}

@@ -1,0 +1,311 @@
+//! What the action keeps from frame to frame: value bounds of volumes, tables and emptiness, and
+//! geometries made ready, each made anew only when what it depends on changed, and shared by all
+//! shapes for which it is the same.
+
+mod solids;
+mod tables;
+
+use std::{
+    collections::{BTreeMap, btree_map::Entry},
+    sync::Arc,
+};
+
+use volact_core::{
+    ActionError, Compositing, Geometry, Roi, ScalarType, VolumeTexture,
+    action::Watch,
+    frame::Rebuild,
+    glam::{DAffine3, DVec3},
+    resolve::ResolvedShape,
+    volume::Components,
+};
+
+use super::{
+    bounds::{Emptiness, Peaks, ValueBounds},
+    classify::Units,
+    fetch::Voxels,
+    options::{Classification, Settings},
+    plan::Plan,
+};
+
+pub use solids::{Prepared, Solid};
+use tables::TableKey;
+pub use tables::Tables;
+
+/// What identifies the bounds of a volume.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct BoundsKey {
+    volume: u64,
+    version: u64,
+    component: usize,
+    roi: [usize; 6],
+    /// Bits of the voxels' origin and gain, in which bounds are counted.
+    units: [u64; 2],
+}
+
+/// Everything kept.
+#[derive(Debug, Default)]
+pub struct Resources {
+    bounds: BTreeMap<BoundsKey, Arc<ValueBounds>>,
+    /// By shape; the same for shapes of the same data and table.
+    tables: BTreeMap<u64, Arc<Tables>>,
+    /// By data: blocks of zeros, which add nothing to a sum.
+    zeros: BTreeMap<BoundsKey, Emptiness>,
+    /// By data, and whether of the maximum.
+    peaks: BTreeMap<(BoundsKey, bool), Peaks>,
+    /// By geometry.
+    geometries: BTreeMap<usize, Kept>,
+}
+
+/// A geometry made ready. While it is kept, no other has its address.
+#[derive(Debug)]
+struct Kept {
+    geometry: Arc<dyn Geometry>,
+    prepared: Prepared,
+}
+
+impl Kept {
+    fn address(geometry: &Arc<dyn Geometry>) -> usize {
+        Arc::as_ptr(geometry).cast::<()>() as usize
+    }
+}
+
+/// The component that a shape reads, or that says how opaque it is.
+pub fn component(shape: &ResolvedShape) -> usize {
+    match (shape.int("component"), shape.volume("volume").map(VolumeTexture::meaning)) {
+        (Some(named), _) => named as usize,
+        (None, Some(Components::LuminanceAlpha)) => 1,
+        (None, Some(Components::Rgba)) => 3,
+        _ => 0,
+    }
+}
+
+/// The voxels that a shape reads, and their units.
+pub fn voxels<'a>(shape: &ResolvedShape, texture: &'a VolumeTexture) -> (Voxels<'a>, Units) {
+    let desc = texture.volume().desc();
+    let mut voxels = Voxels::new(texture, component(shape));
+    let mut units = Units { scale: desc.slope, offset: desc.intercept };
+    let wide = matches!(desc.scalar, ScalarType::F64 | ScalarType::U32 | ScalarType::I32);
+    if wide || desc.scalar.is_float() {
+        // f32 cannot hold these: fetch them relative to the values that the table tells apart,
+        // whatever else there may be, or else to those that occur. Nor can it place floats of
+        // extreme size on a table.
+        let points = shape.table("lookup_table").map(|t| t.points(texture.range()));
+        let span = points.and_then(|p| Some([p.first()?.value, p.last()?.value])).filter(|[a, b]| a < b);
+        let [lo, hi] = span.or_else(|| texture.volume().value_range()).unwrap_or([0.0, 1.0]);
+        let (a, b) = ((lo - desc.intercept) / desc.slope, (hi - desc.intercept) / desc.slope);
+        if wide || !(1e-30..1e30).contains(&(b - a).abs()) {
+            voxels.origin = a;
+            voxels.gain = if a == b { 1.0 } else { 1.0 / (b - a) };
+            units = Units { scale: desc.slope / voxels.gain, offset: lo };
+        }
+    }
+    (voxels, units)
+}
+
+fn bounds_key(shape: &ResolvedShape, texture: &VolumeTexture) -> BoundsKey {
+    let Roi { min, max } = texture.data_roi();
+    let volume = texture.volume();
+    let roi = [min[0], min[1], min[2], max[0], max[1], max[2]];
+    let voxels = voxels(shape, texture).0;
+    let units = [voxels.origin.to_bits(), voxels.gain.to_bits()];
+    BoundsKey { volume: volume.id(), version: volume.version(), component: component(shape), roi, units }
+}
+
+/// How a shape's numbers are reduced: a map to data units that falls makes a maximum of the
+/// values a minimum of the numbers.
+pub fn reduction(shape: &ResolvedShape, units: Units) -> Compositing {
+    match shape.compositing() {
+        Compositing::Maximum if units.scale < 0.0 => Compositing::Minimum,
+        Compositing::Minimum if units.scale < 0.0 => Compositing::Maximum,
+        other => other,
+    }
+}
+
+/// Samples a world unit along each axis of the data.
+fn density(shape: &ResolvedShape, texture: &VolumeTexture) -> DVec3 {
+    let to_index: DAffine3 = texture.object_to_index() * shape.to_object;
+    let row = |a: usize| to_index.matrix3.transpose().col(a).length();
+    DVec3::new(row(0), row(1), row(2))
+}
+
+impl Resources {
+    /// Prepares the shapes for a plan; says what was made anew.
+    ///
+    /// # Errors
+    /// If a geometry is damaged or too large, or an attribute does not go with it.
+    pub fn prepare<'a>(
+        &mut self,
+        shapes: impl Iterator<Item = &'a ResolvedShape>,
+        plan: &Plan,
+        (settings, progress): (&Settings, &Watch),
+        rebuilt: &mut Vec<Rebuild>,
+    ) -> Result<(), ActionError> {
+        // Extinctions that add are those of samples; where they lie on no line, there are no ends.
+        let post = Settings { classification: Classification::Post, ..*settings };
+        for shape in shapes {
+            let mut say = |what: &str, bytes| {
+                log::debug!("{}: {what} made anew, {bytes} bytes", shape.name);
+                rebuilt.push(Rebuild { shape: shape.name.clone(), what: what.into(), bytes });
+            };
+            let bent = self.prepare_geometry(shape, progress, &mut say)?;
+            let Some(texture) = shape.volume("volume") else { continue };
+            let settings = if bent || plan.mixes(shape.id) { &post } else { settings };
+            self.prepare_volume(shape, texture, plan.step, settings, &mut say);
+        }
+        Ok(())
+    }
+
+    /// Forgets what no managed shape uses.
+    pub fn retain<'a>(&mut self, shapes: impl Iterator<Item = &'a ResolvedShape>) {
+        let mut keys = Vec::new();
+        let mut ids = Vec::new();
+        let mut geometries = Vec::new();
+        for shape in shapes {
+            ids.push(shape.id);
+            keys.extend(shape.volume("volume").map(|t| bounds_key(shape, t)));
+            geometries.push(Kept::address(solids::whole(shape)));
+        }
+        self.bounds.retain(|key, _| keys.contains(key));
+        self.peaks.retain(|(key, _), _| keys.contains(key));
+        self.tables.retain(|id, _| ids.contains(id));
+        self.zeros.retain(|key, _| keys.contains(key));
+        self.geometries.retain(|address, _| geometries.contains(address));
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        let mut tables: Vec<_> = self.tables.values().collect();
+        tables.sort_by_key(|t| Arc::as_ptr(t));
+        tables.dedup_by_key(|t| Arc::as_ptr(t));
+        self.bounds.values().map(|b| b.bytes()).sum::<usize>()
+            + tables.into_iter().map(|t| t.bytes()).sum::<usize>()
+            + self.zeros.values().map(Emptiness::bytes).sum::<usize>()
+            + self.peaks.values().map(Peaks::bytes).sum::<usize>()
+            + self.geometries.values().map(|kept| kept.prepared.bytes()).sum::<usize>()
+    }
+
+    /// Tables of a shape.
+    pub fn tables(&self, id: u64) -> Option<&Tables> {
+        self.tables.get(&id).map(Arc::as_ref)
+    }
+
+    /// The geometry of a shape as it was made ready; `None` where it is a box.
+    pub fn prepared(&self, shape: &ResolvedShape) -> Option<&Prepared> {
+        let kept = solids::wanted(shape).then(|| self.geometries.get(&Kept::address(solids::whole(shape))));
+        kept.flatten().map(|kept| &kept.prepared)
+    }
+
+    /// Blocks of zeros of a shape's data.
+    pub fn zeros(&self, shape: &ResolvedShape) -> Option<&Emptiness> {
+        self.zeros.get(&bounds_key(shape, shape.volume("volume")?))
+    }
+
+    /// Bounds of a shape's volume, where they were made.
+    pub fn bounds(&self, shape: &ResolvedShape) -> Option<&ValueBounds> {
+        let texture = shape.volume("volume")?;
+        self.bounds.get(&bounds_key(shape, texture)).map(Arc::as_ref)
+    }
+
+    /// The best that blocks of a shape's volume hold, where that was made.
+    pub fn peaks(&self, shape: &ResolvedShape) -> Option<&Peaks> {
+        let texture = shape.volume("volume")?;
+        let reduction = reduction(shape, voxels(shape, texture).1);
+        self.peaks.get(&(bounds_key(shape, texture), reduction == Compositing::Maximum))
+    }
+
+    /// Makes a shape's geometry ready; whether it carries a volume along.
+    fn prepare_geometry(
+        &mut self,
+        shape: &ResolvedShape,
+        progress: &Watch,
+        say: &mut impl FnMut(&str, usize),
+    ) -> Result<bool, ActionError> {
+        if !solids::wanted(shape) {
+            return Ok(false);
+        }
+        let geometry = solids::whole(shape);
+        let address = Kept::address(geometry);
+        let kept = match self.geometries.entry(address) {
+            Entry::Occupied(there) => there.into_mut(),
+            Entry::Vacant(free) => {
+                let prepared = solids::prepare(shape, progress)?;
+                say(prepared.what(), prepared.bytes());
+                free.insert(Kept { geometry: Arc::clone(geometry), prepared })
+            }
+        };
+        debug_assert!(Arc::ptr_eq(&kept.geometry, geometry));
+        let Prepared::Solid(solid) = &kept.prepared else { return Ok(false) };
+        solids::check_attributes(shape, solid)?;
+        Ok(solid.texture.is_some())
+    }
+
+    fn prepare_volume(
+        &mut self,
+        shape: &ResolvedShape,
+        texture: &VolumeTexture,
+        step: f64,
+        settings: &Settings,
+        say: &mut impl FnMut(&str, usize),
+    ) {
+        let key = bounds_key(shape, texture);
+        let (voxels, units) = voxels(shape, texture);
+        let compositing = shape.compositing();
+        let sums = matches!(compositing, Compositing::Add | Compositing::Average);
+        let skips = settings.skipping && may_skip(shape, texture) && !(voxels.scalar.is_float() && sums);
+        let bounds = match self.bounds.get(&key) {
+            Some(bounds) => Some(Arc::clone(bounds)),
+            None if skips => {
+                let bounds = Arc::new(ValueBounds::new(&voxels, settings.threads));
+                say("value bounds", bounds.bytes());
+                self.bounds.insert(key, Arc::clone(&bounds));
+                Some(bounds)
+            }
+            None => None,
+        };
+        if compositing == Compositing::Over {
+            self.prepare_tables(shape, texture, bounds.as_deref(), step, settings, say);
+            return;
+        }
+        let Some(bounds) = bounds else { return };
+        let reduction = reduction(shape, units);
+        let maximum = reduction == Compositing::Maximum;
+        let extreme = maximum || reduction == Compositing::Minimum;
+        if extreme && !self.peaks.contains_key(&(key, maximum)) {
+            let peaks = bounds.peaks(maximum);
+            say("peaks", peaks.bytes());
+            self.peaks.insert((key, maximum), peaks);
+        }
+        if !extreme && voxels.origin == 0.0 && !self.zeros.contains_key(&key) {
+            let zeros = bounds.emptiness(|lo, hi| lo != 0.0 || hi != 0.0);
+            say("occupancy", zeros.bytes());
+            self.zeros.insert(key, zeros);
+        }
+    }
+
+    fn prepare_tables(
+        &mut self,
+        shape: &ResolvedShape,
+        texture: &VolumeTexture,
+        bounds: Option<&ValueBounds>,
+        step: f64,
+        settings: &Settings,
+        say: &mut impl FnMut(&str, usize),
+    ) {
+        let Some(wanted) = TableKey::new(shape, texture, bounds_key(shape, texture), step, settings) else {
+            self.tables.remove(&shape.id);
+            return;
+        };
+        if self.tables.get(&shape.id).is_some_and(|t| t.key == wanted) {
+            return;
+        }
+        let same = self.tables.values().find(|t| t.key == wanted).map(Arc::clone);
+        let tables = same.unwrap_or_else(|| Arc::new(Tables::new(wanted, shape, texture, bounds, settings, say)));
+        self.tables.insert(shape.id, tables);
+    }
+}
+
+/// Whether anything of a shape may be known to be transparent, or not to count, by its values.
+fn may_skip(shape: &ResolvedShape, texture: &VolumeTexture) -> bool {
+    let by_opacity = matches!(texture.meaning(), Components::Intensity | Components::LuminanceAlpha | Components::Rgba);
+    shape.compositing() != Compositing::Over || shape.table("lookup_table").is_some() || by_opacity
+}
