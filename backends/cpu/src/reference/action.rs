@@ -115,12 +115,11 @@ impl RenderAction for ReferenceAction {
 
     fn caps(&self) -> Caps {
         let names = |names: &[&str]| Some(names.iter().map(|n| (*n).to_owned()).collect());
-        let compositing =
-            vec![Compositing::Over, Compositing::Maximum, Compositing::Minimum, Compositing::Average, Compositing::Add];
+        let values = [Compositing::Maximum, Compositing::Minimum, Compositing::Average, Compositing::Add];
         Caps {
-            shaders: names(&["simple", "lut", "mip", "minip", "average", "xray", "attribute"]),
+            shaders: names(&["simple", "lut", "mip", "minip", "average", "xray", "attribute", "surface"]),
             geometries: None,
-            compositing,
+            compositing: [Compositing::Over, Compositing::First].into_iter().chain(values).collect(),
             overlap: true,
             depth: true,
             device: "scalar f64".into(),

@@ -95,6 +95,10 @@ impl March {
         if pieces.iter().any(|p| matches!(p.kind, Kind::Opaque { .. })) {
             return self.meet_opaque(pieces, certain);
         }
+        // Wherever exactly a piece begins, its colour meets the transmittance before it.
+        if let [Piece { kind: Kind::Smooth, color, .. }] = pieces {
+            self.jump(color.each_ref().map(|c| cubic::eval(c, -1.0)));
+        }
         self.loosen(pieces);
         let absorbs = pieces.iter().any(|p| p.kind == Kind::Smooth);
         let goes_on = !absorbs || self.integrate(pieces);

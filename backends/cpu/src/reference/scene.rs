@@ -14,25 +14,18 @@ use volact_core::{
 };
 
 use super::{
-    carried::{self, Cells, Part},
-    flat::{self, Gather},
+    flat,
     hit::{self, Hit},
-    lattice::{self, Counting},
-    line::{EPS, Lines},
+    lattice::Counting,
     march::{Light, March},
     mark::{Mark, Stretches},
-    medium::Voxels,
+    met::{self, Met, Sampling},
     options::{Classification, Method, ReferenceOptions},
-    overlap::{self, Along, Track},
-    piece::{Cutter, Piece},
-    prepare::{Body, GridBody, Prepared, check, prepare},
-    sight::Sight,
-    slices, surfaces,
+    overlap,
+    piece::Cutter,
+    prepare::{Prepared, check, prepare},
+    surfaces,
 };
-
-/// Stretches of a mesh that are no further apart than this part of the distances on the ray are
-/// one to a lattice.
-const GAP: f64 = 1e-13;
 
 /// All that is drawn, and for whom.
 pub(super) struct Scene<'a> {
@@ -55,29 +48,6 @@ pub(super) struct Pixel {
     pub light: Light,
     pub samples: u64,
     pub met: bool,
-}
-
-/// A shape as a ray meets it.
-struct Met<'a> {
-    shape: &'a Prepared,
-    anchor: f64,
-    way: Way<'a>,
-}
-
-/// How a ray goes through a body.
-enum Way<'a> {
-    /// Along stretches of a block.
-    Grid(&'a GridBody, Lines),
-    /// Through tetrahedra.
-    Cells(&'a Cells, carried::Way),
-}
-
-/// Where a part of a way begins.
-#[derive(Clone, Copy)]
-struct Start {
-    t: f64,
-    mark: Mark,
-    dt: f64,
 }
 
 /// What rounding leaves open.
@@ -144,7 +114,7 @@ impl<'a> Scene<'a> {
         let mut pixel = Pixel { light: Light::NONE, samples: 0, met: false };
         let limit = drawn.map_or(f64::INFINITY, |d| d.mark.t.hi);
         let mut seen = Stretches::between(Mark::exact(ray.near), Mark::exact(ray.far.min(limit)));
-        let mut hits = Vec::new();
+        let (mut hits, sampling) = (Vec::new(), self.sampling(&ray));
         self.surfaces.iter().for_each(|s| s.hits(&ray, &self.frame.clip, &seen, &mut hits));
         // Surfaces end what lies behind them, also where it is a picture of its own.
         let end = hits.iter().filter(|h| h.is_opaque()).map(|h| h.mark).min_by(Mark::order);
@@ -154,7 +124,7 @@ impl<'a> Scene<'a> {
         let open = hits.iter().any(|h| !h.is_opaque());
         let (mut over, mut flat) = (Vec::new(), Vec::new());
         for shape in &self.shapes {
-            let Some(met) = self.meet(shape, &ray, &seen, &mut hits) else { continue };
+            let Some(met) = Met::new(shape, &ray, &self.frame.clip, &sampling, &seen, &mut hits) else { continue };
             if shape.compositing == Compositing::Over { over.push(met) } else { flat.push(met) }
         }
         over.sort_by_key(|m| m.shape.id);
@@ -164,11 +134,12 @@ impl<'a> Scene<'a> {
         over.retain(Met::is_through);
         hits.extend(drawn);
         if !over.is_empty() || !hits.is_empty() {
-            (pixel.light, pixel.samples) = self.over(&ray, &over, hit::in_order(hits), range, cutter);
+            (pixel.light, pixel.samples) = self.over(&sampling, &over, hit::in_order(hits), range, cutter);
             pixel.light.depth -= ray.depth_zero;
         }
         for met in flat.iter().filter(|m| m.is_through()) {
-            let (light, samples) = self.flat(&ray, met);
+            let (gathered, samples) = met.gather(&sampling);
+            let light = gathered.light(met.shape.compositing, &met.shape.medium);
             pixel.light = flat::over(&light, &pixel.light);
             pixel.samples += samples;
         }
@@ -189,79 +160,25 @@ impl<'a> Scene<'a> {
         (Some(hit), [lowest.min(0.0), if highest <= a { 0.0 } else { highest.max(0.0) }])
     }
 
-    /// A shape on a ray, where anything of it is left by all that cuts it; and its slices' hits.
-    fn meet<'s>(&'s self, shape: &'s Prepared, ray: &Ray, seen: &Stretches, hits: &mut Vec<Hit>) -> Option<Met<'s>> {
-        let sight = Sight::new(ray, &shape.to_object, shape.center)?;
-        let mut stretches = seen.clone();
-        sight.clip(&shape.clip, &self.frame.clip, &mut stretches);
-        // A lattice's segments are not cut where rounding parts tetrahedra.
-        let gap = if self.options.method == Method::Exact { 0.0 } else { GAP };
-        let way = match &shape.body {
-            Body::Grid(body) => {
-                body.place.crop(&sight, &mut stretches);
-                slices::of_grid(shape, body, &sight, &stretches, hits);
-                Way::Grid(body, body.place.lines(&sight, &stretches))
-            }
-            Body::Carved(mesh, body) => {
-                body.place.crop(&sight, &mut stretches);
-                let inside = mesh.trace(&sight).stretches(gap).meet(&stretches);
-                slices::of_grid(shape, body, &sight, &inside, hits);
-                Way::Grid(body, body.place.lines(&sight, &inside))
-            }
-            Body::Cells(cells) => {
-                let way = cells.meet(&shape.medium, &sight, gap, &stretches);
-                slices::of_cells(shape, cells, &sight, &way, hits);
-                Way::Cells(cells, way)
-            }
-        };
-        let met = Met { shape, anchor: sight.anchor, way };
-        let drawn = shape.slices.as_ref().is_none_or(|s| s.volume);
-        (drawn && (met.is_through() || met.grazed() > 0.0)).then_some(met)
-    }
-
-    fn counting(&self, ray: &Ray) -> Option<Counting> {
+    fn sampling(&self, ray: &Ray) -> Sampling {
         let step = self.options.sample_distance;
-        match self.options.method {
+        let counting = match self.options.method {
             Method::Exact => None,
             Method::Rays => Some(Counting::rays(step)),
             Method::Planes => Some(Counting::planes(step, ray, self.rays.axis(), self.rays.eye())),
-        }
-    }
-
-    fn flat(&self, ray: &Ray, met: &Met<'_>) -> (Light, u64) {
-        let (shape, counting) = (met.shape, self.counting(ray));
-        let ends = self.options.classification == Classification::PreIntegrated;
-        let (mut gathered, mut samples) = (Gather::NONE, 0);
-        match &met.way {
-            Way::Grid(body, met) => {
-                let voxels = Voxels::new(&body.texture);
-                for line in &met.lines {
-                    samples += match &counting {
-                        None => flat::gather(&mut gathered, &shape.medium, &body.grid, &voxels, line),
-                        Some(counting) => lattice::gather(&mut gathered, &shape.medium, &voxels, line, counting, ends),
-                    };
-                }
-            }
-            Way::Cells(cells, way) => {
-                samples += match &counting {
-                    None => way.gather(&mut gathered, cells, &shape.medium),
-                    Some(counting) => way.gather_samples(&mut gathered, cells, &shape.medium, counting, ends),
-                };
-            }
-        }
-        (gathered.light(shape.compositing, &shape.medium), samples)
+        };
+        Sampling { counting, between_ends: self.options.classification == Classification::PreIntegrated }
     }
 
     /// The depth-composited shapes of a ray, and hits in order.
     fn over(
         &self,
-        ray: &Ray,
+        sampling: &Sampling,
         shapes: &[Met<'_>],
         hits: Vec<Hit>,
         range: [f64; 2],
         cutter: &mut Cutter,
     ) -> (Light, u64) {
-        let counting = self.counting(ray);
         let mut march = March::new(f64::from(self.frame.depth_threshold), range);
         let first = hits.first().map(|h| h.mark.t.hi).filter(|t| t.is_finite());
         let zero = shapes.first().map(|m| m.anchor).or(first).unwrap_or(0.0);
@@ -269,9 +186,9 @@ impl<'a> Scene<'a> {
             && met.track_count() == 1
             && hits.is_empty()
         {
-            self.pieces(met, 0, counting.as_ref(), cutter, |piece, _| march.advance(std::slice::from_ref(piece)));
+            met.pieces(0, sampling, cutter, |piece, _| march.advance(std::slice::from_ref(piece)));
         } else {
-            let mut along = self.along(shapes, zero, counting.as_ref(), cutter);
+            let mut along = met::along(shapes, zero, sampling, cutter);
             along.add_hits(hits, zero);
             overlap::sweep(&along, &mut march);
         }
@@ -279,107 +196,6 @@ impl<'a> Scene<'a> {
         let mut light = march.finish();
         light.depth += zero;
         (light, samples)
-    }
-
-    /// Visits the pieces of one of a shape's tracks in order, each with the start of what it is a
-    /// piece of, until `visit` says false.
-    fn pieces(
-        &self,
-        met: &Met<'_>,
-        track: usize,
-        counting: Option<&Counting>,
-        cutter: &mut Cutter,
-        mut visit: impl FnMut(&Piece, Start) -> bool,
-    ) {
-        let medium = &met.shape.medium;
-        let post = self.options.classification == Classification::Post;
-        let mut goes_on = true;
-        match &met.way {
-            Way::Grid(body, met) => {
-                let voxels = Voxels::new(&body.texture);
-                for line in &met.lines {
-                    let start = Start { t: line.t[0], mark: line.ends[0], dt: line.dt };
-                    let mut visit = |piece: &Piece| {
-                        goes_on = visit(piece, start);
-                        goes_on
-                    };
-                    match counting {
-                        None => body.grid.walk(line, |cell| cutter.cut(medium, &voxels, line, cell, &mut visit)),
-                        Some(counting) if post => lattice::post(medium, &voxels, line, counting, &mut visit),
-                        Some(counting) => lattice::pre_integrated(medium, &voxels, line, counting, cutter, &mut visit),
-                    }
-                    if !goes_on {
-                        return;
-                    }
-                }
-            }
-            Way::Cells(cells, way) => {
-                let track = &way.tracks[track];
-                let start = |part: &Part| Start { t: part.t[0], mark: part.ends[0], dt: part.dt };
-                match (counting, track.first().map(start)) {
-                    (None, _) => way.pieces(track, cells, medium, cutter, |piece, part| visit(piece, start(part))),
-                    (Some(counting), Some(first)) => {
-                        way.samples(track, cells, medium, (counting, !post), cutter, |piece| visit(piece, first));
-                    }
-                    _ => {}
-                }
-            }
-        }
-    }
-
-    /// All shapes' pieces, counted from one zero.
-    fn along(&self, shapes: &[Met<'_>], zero: f64, counting: Option<&Counting>, cutter: &mut Cutter) -> Along {
-        let mut along = Along::default();
-        for met in shapes {
-            let shift = met.anchor - zero;
-            let around = 8.0 * EPS * (met.anchor.abs() + zero.abs() + shift.abs());
-            for number in 0..met.track_count() {
-                let mut track = Track::new();
-                self.pieces(met, number, counting, cutter, |piece, start| {
-                    along.snap = along.snap.max(2.0 * start.dt + around);
-                    let entry = (piece.t[0] == start.t).then(|| number_of(&mut along.starts, start.mark));
-                    track.push(Piece { t: piece.t.map(|t| t + shift), entry, ..*piece });
-                    true
-                });
-                along.tracks.push(track);
-            }
-        }
-        along
-    }
-}
-
-/// The number of a place among those that are known already; a new one if it is not the same as
-/// any of them.
-fn number_of(known: &mut Vec<Mark>, mark: Mark) -> usize {
-    let same = |m: &Mark| m.compare(&mark).is_some_and(|order| order.is_eq());
-    known.iter().position(same).unwrap_or_else(|| {
-        known.push(mark);
-        known.len() - 1
-    })
-}
-
-impl Met<'_> {
-    fn is_through(&self) -> bool {
-        match &self.way {
-            Way::Grid(_, met) => !met.lines.is_empty(),
-            Way::Cells(_, way) => !way.tracks.is_empty(),
-        }
-    }
-
-    /// Tracks whose pieces may overlap.
-    fn track_count(&self) -> usize {
-        match &self.way {
-            Way::Grid(..) => 1,
-            Way::Cells(_, way) => way.tracks.len(),
-        }
-    }
-
-    /// The length of stretches that are too short to be integrated.
-    fn grazed(&self) -> f64 {
-        match &self.way {
-            Way::Grid(_, met) => met.grazed,
-            Way::Cells(_, way) => way.grazed,
-        }
     }
 }
 

@@ -131,3 +131,30 @@ fn depth_is_where_half_is_absorbed() {
     let shape = lut(&ramp(), table(&[point(0.0, RED, 0.1)]), 1.0);
     assert_eq!(picture(&[shape], &along_z(0.3, 0.6)).depth[0], f64::INFINITY);
 }
+
+/// Next to nothing of the ray is needed: no scene may take long, and colours are those of the
+/// entry.
+#[test]
+fn unit_distance_of_next_to_nothing_ends_quickly() {
+    let started = std::time::Instant::now();
+    for unit in [1e-12, 1e-30, 1e-200, f64::MIN_POSITIVE] {
+        let flat = lut(&volume_of([2, 2, 5], |_| 0.0), table(&[point(0.0, RED, 0.5)]), unit);
+        certify(&[flat], &along_z(0.3, 0.4), [RED[0], RED[1], RED[2], 1.0]);
+        // Opacity rises from nothing: what absorbs first is the colour of the beginning.
+        let rising = lut(&ramp(), table(&[point(0.0, RED, 0.0), point(1.0, [0.0, 0.0, 1.0], 0.5)]), unit);
+        let made = picture(&[rising], &along_z(0.3, 0.4));
+        assert!(made.lower[0][3] > 1.0 - 1e-9, "{unit:e}: {:?} {:?}", made.lower[0], made.upper[0]);
+        assert!((made.color[0][0] - 1.0).abs() < 1e-4, "{unit:e}: {:?}", made.color[0]);
+        let waves = volume_of([5; 3], |[x, y, z]| 0.5 + 0.5 * (1.3 * x as f64 + 2.1 * y as f64 + 3.0 * z as f64).sin());
+        let tents =
+            [point(0.2, RED, 0.0), point(0.5, [0.0, 1.0, 0.0], 0.7), point(0.8, RED, 0.0), point(0.9, RED, 1.0)];
+        let shapes = [lut(&waves, table(&tents), unit), lut(&waves, table(&tents), 10.0 * unit)];
+        let frame = volact_core::FrameDesc::fit(&shapes[0], volact_core::View::Iso, 8, 8);
+        for count in [1, 2] {
+            let made = picture(&shapes[..count], &frame);
+            let sane = |i: usize| (0..4).all(|c| made.lower[i][c] <= made.upper[i][c] && made.upper[i][c] <= 1.0);
+            assert!((0..64).all(sane), "{unit:e}");
+        }
+    }
+    assert!(started.elapsed().as_secs() < 60, "{:?}", started.elapsed());
+}

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use proptest::prelude::*;
 use volact_core::{
-    ActionError, Appearance, Block, Clip, Filter, Plane, ScalarType, Shape, SliceStyle, Sliced, Slices, Volume,
-    VolumeDesc, VolumeTexture,
+    ActionError, Appearance, Attribute, Block, Buffer, CellType, CellTypes, Clip, Filter, FrameDesc, Geometry, Mesh,
+    Plane, ScalarType, Shape, SliceStyle, Sliced, Slices, View, Volume, VolumeDesc, VolumeTexture,
     geometry::ClipRegion,
     glam::{DAffine3, DMat3, DVec3},
     resolve::ResolvedShape,
@@ -284,6 +284,56 @@ proptest! {
         // The pixel's centre is off the target by what the camera rounds.
         let made = picture(&[shape], &one_ray(DVec3::from(from), target));
         enclose(&made, [alpha * grey, alpha * grey, alpha * grey, alpha], 1e-12, 1e-12);
+    }
+}
+
+/// The box of [`slab`] in six tetrahedra, and the function z/4 + y/40 on its corners.
+fn tetrahedra() -> (Mesh, Attribute) {
+    let block = Block::new(DVec3::ZERO, DVec3::splat(4.0)).unwrap().tessellate().unwrap();
+    let corners: Vec<u32> = block.tetrahedra.iter().flatten().copied().collect();
+    let types = CellTypes::All(CellType::Tetrahedron);
+    let mesh = Mesh::new(block.vertices.clone(), types, Buffer::from_vec(corners)).unwrap();
+    let numbers: Vec<f64> = block.vertices.iter().map(|p| p.z / 4.0 + p.y / 40.0).collect();
+    (mesh, Attribute::new("height", ScalarType::F64, 1, Buffer::from_vec(numbers)).unwrap())
+}
+
+#[test]
+fn meshes_are_sliced_by_what_they_carry() {
+    let (mesh, attribute) = tetrahedra();
+    let look = Appearance::new("attribute")
+        .with("scalars", attribute)
+        .with("lookup_table", table(&[point(0.0, [0.0; 3], 0.0), point(1.0, [1.0, 0.5, 0.0], 0.8)]))
+        .with("unit_distance", 1.0);
+    let shape = Shape::new(mesh, look);
+    let made = sliced(&shape, vec![level(1.25), level(3.0), level(5.0)], SliceStyle::Blended, false);
+    let mut truth = [0.0; 4];
+    for z in [1.25, 3.0] {
+        let (value, left) = (z / 4.0 + 0.01, 1.0 - truth[3]);
+        truth[0] += left * 0.8 * value * value;
+        truth[1] += left * 0.8 * value * value * 0.5;
+        truth[3] += left * 0.8 * value;
+    }
+    certify(&[made], &along_z(0.3, 0.4), truth);
+    // On a face of the mesh, where the medium begins, and with it around.
+    let made = sliced(&shape, vec![level(0.0)], SliceStyle::Opaque, true);
+    certify(&[made], &along_z(0.3, 0.4), [0.01, 0.005, 0.0, 1.0]);
+}
+
+#[test]
+fn carved_volume_is_sliced_as_its_block() {
+    let data = volume_of([5; 3], |[x, y, z]| (1.3 * x as f64 + 2.1 * y as f64 + 0.7 * (z * z) as f64).sin());
+    let block = lut(&data, table(&[point(-1.0, [0.0; 3], 0.1), point(1.0, [1.0; 3], 0.9)]), 1.0);
+    let carved = block.named("carved");
+    carved.set_geometry(tetrahedra().0);
+    let planes = vec![plane([2.0, 1.0, 2.2], [0.3, -0.2, 1.0]), plane([1.0, 2.0, 3.0], [-1.0, 0.5, 0.4])];
+    let frame = FrameDesc::fit(&block, View::Iso, 12, 10);
+    for (style, volume) in [(SliceStyle::Opaque, false), (SliceStyle::Blended, false), (SliceStyle::Blended, true)] {
+        let [a, b] = [&block, &carved].map(|s| picture(&[sliced(s, planes.clone(), style, volume)], &frame));
+        assert_eq!((a.not_certified, b.not_certified), (0, 0), "{style:?} {volume}");
+        assert!(a.color.iter().any(|c| c[3] > 0.3));
+        for (a, b) in a.color.iter().flatten().zip(b.color.iter().flatten()) {
+            assert!((a - b).abs() < 1e-11, "{style:?} {volume}: {a} {b}");
+        }
     }
 }
 
