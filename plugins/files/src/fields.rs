@@ -49,7 +49,7 @@ pub(crate) fn dimensions(path: &Path, field: &str, sizes: &[u64]) -> Result<[usi
     }
     let total = sizes.iter().try_fold(1u64, |n, s| n.checked_mul(*s));
     if total.is_none_or(|n| n > 1 << 56) {
-        return bad("a volume that memory can hold");
+        return bad("a grid that memory can hold");
     }
     Ok(std::array::from_fn(|a| sizes.get(a).map_or(1, |n| *n as usize)))
 }

@@ -8,6 +8,7 @@ use std::{
     fs,
     io::{BufReader, BufWriter, Read, Seek, Write},
     path::{Path, PathBuf},
+    sync::{Mutex, PoisonError},
 };
 
 use exr::prelude as ex;
@@ -255,9 +256,35 @@ fn encode(path: &Path, source: impl std::error::Error + Send + Sync + 'static) -
 }
 
 /// Writes a file under a temporary name in the same folder and renames it when it is complete.
+/// The files that pictures are being written to, or `None` when no more may be begun.
+static UNFINISHED: Mutex<Option<Vec<PathBuf>>> = Mutex::new(Some(Vec::new()));
+
+/// For a program that is told to end: removes what was written of pictures that are not complete.
+/// None can be written after that.
+pub fn discard_unfinished() {
+    let unfinished = UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner).take();
+    for path in unfinished.into_iter().flatten() {
+        _ = fs::remove_file(path);
+    }
+}
+
+/// Creates a file that [`discard_unfinished`] removes until it is finished.
+fn begin(temporary: &Path) -> std::io::Result<fs::File> {
+    let mut unfinished = UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner);
+    let Some(unfinished) = unfinished.as_mut() else { return Err(std::io::ErrorKind::Interrupted.into()) };
+    let file = fs::File::create(temporary)?;
+    unfinished.push(temporary.to_owned());
+    Ok(file)
+}
+
+fn finish(temporary: &Path) {
+    let mut unfinished = UNFINISHED.lock().unwrap_or_else(PoisonError::into_inner);
+    unfinished.iter_mut().for_each(|paths| paths.retain(|path| path != temporary));
+}
+
 fn replace(path: &Path, write: impl FnOnce(&mut fs::File) -> Result<(), LoadError>) -> Result<(), LoadError> {
     let temporary = temporary_name(path);
-    let result = fs::File::create(&temporary)
+    let result = begin(&temporary)
         .map_err(|e| LoadError::io(&temporary, e))
         .and_then(|mut file| {
             write(&mut file)?;
@@ -267,6 +294,7 @@ fn replace(path: &Path, write: impl FnOnce(&mut fs::File) -> Result<(), LoadErro
     if result.is_err() {
         _ = fs::remove_file(&temporary);
     }
+    finish(&temporary);
     result
 }
 

@@ -116,7 +116,9 @@ struct File<'a> {
 
 fn decode(path: &Path, error: impl std::fmt::Display) -> LoadError {
     let message = error.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
-    let short: String = message.chars().take(300).collect();
+    // What follows is the grammar's own notation.
+    let end = [" Error: ParseError", " Error: error at"].iter().filter_map(|word| message.find(word)).min();
+    let short: String = message[..end.unwrap_or(message.len())].chars().take(300).collect();
     LoadError::Decode { path: path.into(), source: short.into() }
 }
 

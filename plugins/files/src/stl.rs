@@ -58,7 +58,9 @@ fn read(
     let head = &bytes[..bytes.len().min(1024)];
     let text = head.trim_ascii_start().to_ascii_lowercase().starts_with(b"solid") && !head.contains(&0);
     let kind = if text && stated != Some(bytes.len() as u64) {
-        facets_of_text(path, bytes, &meter, &mut welded)?;
+        if !facets_of_text(path, bytes, &meter, &mut welded)? {
+            warnings.push(note(&name, "the last solid has no end: the file may be cut"));
+        }
         ScalarType::F64
     } else {
         let stated = stated.unwrap_or(HEAD);
@@ -136,13 +138,17 @@ fn facets_of_bytes(path: &Path, bytes: &[u8], meter: &Meter<'_>, out: &mut Welde
 }
 
 /// `facet normal x y z`, `outer loop`, three times `vertex x y z`, `endloop`, `endfacet`, between
-/// `solid` and `endsolid`, whose names go to the end of their lines.
-fn facets_of_text(path: &Path, bytes: &[u8], meter: &Meter<'_>, out: &mut Welded) -> Result<(), LoadError> {
+/// `solid` and `endsolid`, whose names go to the end of their lines. Gives whether the last solid
+/// has its end.
+fn facets_of_text(path: &Path, bytes: &[u8], meter: &Meter<'_>, out: &mut Welded) -> Result<bool, LoadError> {
     let mut scan = Scanner::new(path, bytes);
-    let mut facet = 0;
+    let (mut facet, mut closed) = (0, false);
     while let Some(word) = lower(&mut scan) {
         match word.as_str() {
-            "solid" | "endsolid" => scan.end_line(),
+            "solid" | "endsolid" => {
+                closed = word == "endsolid";
+                scan.end_line();
+            }
             "facet" => {
                 expect(&mut scan, facet, "normal")?;
                 let _ = [0; 3].map(|_| scan.word());
@@ -167,7 +173,7 @@ fn facets_of_text(path: &Path, bytes: &[u8], meter: &Meter<'_>, out: &mut Welded
             }
         }
     }
-    Ok(())
+    Ok(closed)
 }
 
 fn lower(scan: &mut Scanner<'_>) -> Option<String> {

@@ -151,7 +151,7 @@ pub(crate) fn parse(storage: &Storage, path: &Path, kind: &str, cure: &str) -> R
     let mut document = Document { path: path.into(), ..Document::default() };
     let mut state = State::default();
     let mut buffer = Vec::new();
-    let mut is_vtk = false;
+    let (mut is_vtk, mut closed) = (false, false);
     loop {
         buffer.clear();
         let before = xml.buffer_position();
@@ -174,18 +174,25 @@ pub(crate) fn parse(storage: &Storage, path: &Path, kind: &str, cure: &str) -> R
                     }
                 };
                 document.appended = Some((base64, appended_start(storage, path, xml.buffer_position())?));
+                closed = true;
                 break;
             }
             Event::Start(e) => state.start(&mut document, kind, &e, xml.buffer_position(), false),
             Event::Empty(e) => state.start(&mut document, kind, &e, xml.buffer_position(), true),
             Event::Text(text) => state.text(&mut document, &text, (before, xml.buffer_position())),
-            Event::End(e) => state.end(e.name().as_ref()),
+            Event::End(e) => {
+                closed |= e.name().as_ref() == "VTKFile";
+                state.end(e.name().as_ref());
+            }
             Event::Eof => break,
             _ => {}
         }
     }
     if !is_vtk {
         return Err(LoadError::invalid(path, "element VTKFile", "missing", "one"));
+    }
+    if !closed {
+        return Err(LoadError::invalid(path, "end of the file", "inside its elements", "</VTKFile>"));
     }
     Ok(document)
 }
@@ -263,8 +270,9 @@ impl State {
             if let Some(section) = section.and_then(|s| piece.and_then(|p| p.sections.get_mut(s))) {
                 let attributes = Attributes::new(e);
                 let get = |name, default: &str| attributes.get(name).unwrap_or(default).to_owned();
+                let unnamed = if self.section.as_deref() == Some("Points") { "Points" } else { "" };
                 section.arrays.push(Array {
-                    name: get("Name", ""),
+                    name: get("Name", unnamed),
                     type_name: get("type", ""),
                     format: get("format", "ascii"),
                     inline: (after, after),

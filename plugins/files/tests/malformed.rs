@@ -3,6 +3,8 @@
 //! The table in `docs/malformed-inputs.md` is made from the same cases; `VOLACT_BLESS=1` rewrites
 //! it.
 
+mod mesh_cases;
+mod mesh_samples;
 mod samples;
 
 use std::{error::Error, fmt::Write, fs, path::Path};
@@ -15,7 +17,7 @@ use volact_core::{
     LoadError, ScalarType,
     loader::{LoadOptions, NoProgress},
 };
-use volact_files::{Storage, open_in};
+use volact_files::{Storage, open_in, read_mesh_in};
 
 /// Format, input and message.
 const MESSAGES: &[(&str, &str, &str)] = &[
@@ -25,7 +27,7 @@ const MESSAGES: &[(&str, &str, &str)] = &[
     (
         "raw",
         "2^60 voxels in 60 bytes",
-        "v.raw.ron: dims is [1048576, 1048576, 1048576], wanted a volume that memory can hold",
+        "v.raw.ron: dims is [1048576, 1048576, 1048576], wanted a grid that memory can hold",
     ),
     ("raw", "2^55 bytes in 60", "v.raw: holds 60 bytes of voxels, wanted 36028797018963968"),
     (
@@ -213,7 +215,11 @@ const MESSAGES: &[(&str, &str, &str)] = &[
         r##"v.vtk: first line is "# vtk DataFile Version 9.0", wanted # vtk DataFile Version 1.0 to 5.x"##,
     ),
     ("vtk", "neither ASCII nor BINARY", r#"v.vtk: coding is "XML", wanted ASCII or BINARY"#),
-    ("vtk", "a mesh", "v.vtk: dataset UNSTRUCTURED_GRID is not supported; only STRUCTURED_POINTS are volumes; meshes are read by the loader vtk-mesh"),
+    (
+        "vtk",
+        "a mesh",
+        "v.vtk: dataset UNSTRUCTURED_GRID is not supported; only STRUCTURED_POINTS are volumes; meshes are read by the loader vtk-mesh",
+    ),
     ("vtk", "points that do not fit", "v.vtk: POINT_DATA is 61, wanted 60, the product of DIMENSIONS"),
     ("vtk", "no lookup table line", r#"v.vtk: line after SCALARS is "\0\0\0\0\0\0\0\0\0\0\0\0", wanted LOOKUP_TABLE"#),
     ("vtk", "unknown type", r#"v.vtk: data type is "word", wanted a type of VTK, e.g. float"#),
@@ -244,7 +250,11 @@ const MESSAGES: &[(&str, &str, &str)] = &[
     ("vti", "no base64", "v.vti: cannot be decoded: Invalid symbol 33, offset 2."),
     ("vti", "fewer bytes than the grid", r#"v.vti: array "s" is 3 bytes, wanted 60 bytes"#),
     ("vti", "base64 cut", "v.vti: holds 6 bytes of base64 data, wanted 64"),
-    ("vti", "lzma", r#"v.vti: compressor "vtkLZMADataCompressor" is not supported; save it with zlib, with LZ4 or uncompressed"#),
+    (
+        "vti",
+        "lzma",
+        r#"v.vti: compressor "vtkLZMADataCompressor" is not supported; save it with zlib, with LZ4 or uncompressed"#,
+    ),
     (
         "vti",
         "2^32 blocks",
@@ -279,8 +289,13 @@ fn message(case: &Case) -> String {
     if case.what.contains("option") {
         options.insert("spacings".into(), 2.0.into());
     }
-    let result = open_in(&storage, case.loader, Path::new(case.path), &options)
-        .and_then(|mut reader| reader.read(&NoProgress).map(|_| ()));
+    let path = Path::new(case.path);
+    let mesh = mesh_cases::LOADERS.contains(&case.loader);
+    let result = if mesh {
+        read_mesh_in(&storage, case.loader, path, &options, &NoProgress).map(|_| ())
+    } else {
+        open_in(&storage, case.loader, path, &options).and_then(|mut reader| reader.read(&NoProgress).map(|_| ()))
+    };
     match result {
         Ok(()) => "accepted".into(),
         Err(error) => chain(&error),
@@ -594,19 +609,24 @@ fn cases() -> Vec<Case> {
         png_cases(),
         vtk_cases(),
         vti_cases(),
+        mesh_cases::cases(),
     ]
     .into_iter()
     .flatten()
     .collect()
 }
 
+fn messages() -> impl Iterator<Item = &'static (&'static str, &'static str, &'static str)> {
+    MESSAGES.iter().chain(mesh_cases::MESSAGES)
+}
+
 #[test]
 fn every_malformed_input_has_its_message() {
     let cases = cases();
-    assert!(cases.len() >= 30);
-    assert_eq!(cases.len(), MESSAGES.len());
+    assert!(cases.len() >= 200);
+    assert_eq!(cases.len(), messages().count());
     let mut wrong = Vec::new();
-    for (case, (loader, what, wanted)) in cases.iter().zip(MESSAGES) {
+    for (case, (loader, what, wanted)) in cases.iter().zip(messages()) {
         assert_eq!((case.loader, case.what), (*loader, *what));
         let found = message(case);
         if found != *wanted {
@@ -622,7 +642,7 @@ fn table_of_malformed_inputs_is_current() {
         "# Malformed inputs and their messages\n\nMade by `plugins/files/tests/malformed.rs`, which asserts each; \
          `VOLACT_BLESS=1 cargo test -p volact-files` rewrites it.\n\n| format | input | message |\n| --- | --- | --- |\n",
     );
-    for (loader, what, message) in MESSAGES {
+    for (loader, what, message) in messages() {
         let message = message.replace('|', "\\|").replace('\n', " ");
         writeln!(text, "| {loader} | {what} | `{message}` |").unwrap();
     }

@@ -55,10 +55,10 @@ impl<'a> Meter<'a> {
 
     /// So much of the step under way is done.
     pub(crate) fn tell(&self, part: u64, of: u64) -> Result<(), LoadError> {
-        let share = self.done as f64 + if part < of { part as f64 / of as f64 } else { 0.0 };
-        let done =
-            if self.done == self.steps { self.total } else { (self.total as f64 * share / self.steps as f64) as u64 };
-        if self.progress.advance(done.min(self.total), self.total) {
+        let share = self.done as f64 + part.min(of) as f64 / of.max(1) as f64;
+        let done = (self.total as f64 * share / self.steps as f64) as u64;
+        let done = if self.done == self.steps { self.total } else { done.min(self.total) };
+        if self.progress.advance(done, self.total) {
             return Ok(());
         }
         Err(LoadError::Stopped { path: self.path.into() })

@@ -183,8 +183,13 @@ pub(super) fn find_grid(
 ) -> Result<(Layout, Vec<Block>, u64), LoadError> {
     let length = bytes.len() as u64;
     let open = Layout::all(options);
-    let known: Vec<_> =
-        open.iter().filter_map(|l| blocks(bytes, *l, Role::Grid).map(|(b, end)| (*l, b, end))).collect();
+    let fits = |l: &Layout| blocks(bytes, *l, Role::Grid).map(|(b, end)| (*l, b, end));
+    let mut known: Vec<_> = open.iter().filter_map(fits).collect();
+    // Lengths around records that are right are no chance. Without them, the length of the first
+    // record and what stands in it can pass for dimensions.
+    if known.iter().any(|(layout, ..)| layout.records) {
+        known.retain(|(layout, ..)| layout.records);
+    }
     let mut exact: Vec<_> = known.iter().filter(|(_, _, end)| *end == length).cloned().collect();
     match exact.len() {
         1 => return Ok(exact.remove(0)),
