@@ -53,7 +53,6 @@ fn layers() -> LookupTable {
 #[track_caller]
 fn agree(a: &ReferencePicture, b: &ReferencePicture) {
     assert_eq!((a.not_certified, b.not_certified), (0, 0), "widest {:e} {:e}", a.widest, b.widest);
-    assert!(a.color.iter().any(|c| c[3] > 0.01), "nothing to compare");
     for i in 0..a.color.len() {
         for c in 0..4 {
             let apart = (a.color[i][c] - b.color[i][c]).abs();
@@ -219,6 +218,7 @@ fn scene_clip_is_the_shape_clip_through_its_transform() {
     let frame = view(&shape);
     let world = clip.transformed(&shape.state().transform);
     let by_scene = picture(std::slice::from_ref(&shape), &frame.clone().with_clip(world));
+    assert!(by_scene.color.iter().filter(|c| c[3] > 0.5).count() > 20);
     agree(&picture(&[clipped(&shape, clip)], &frame), &by_scene);
 }
 
