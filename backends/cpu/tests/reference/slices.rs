@@ -5,14 +5,16 @@ use std::sync::Arc;
 use proptest::prelude::*;
 use volact_core::{
     ActionError, Appearance, Attribute, Block, Buffer, CellType, CellTypes, Clip, Filter, FrameDesc, Geometry, Mesh,
-    Plane, ScalarType, Shape, SliceStyle, Sliced, Slices, View, Volume, VolumeDesc, VolumeTexture,
+    Opaque, OpaqueDepth, Plane, ScalarType, Shape, SliceStyle, Sliced, Slices, View, Volume, VolumeDesc, VolumeTexture,
     geometry::ClipRegion,
     glam::{DAffine3, DMat3, DVec3},
     resolve::ResolvedShape,
 };
 use volact_cpu::reference::{Classification, Method, ReferenceOptions, check, integrate};
 
-use super::common::{along_z, certify, enclose, lut, one_ray, picture, point, resolve, table, volume_of};
+use super::common::{
+    along_z, certify, enclose, lut, one_ray, picture, point, resolve, table, truth, volume, volume_of,
+};
 
 const RED: [f64; 3] = [1.0, 0.0, 0.0];
 
@@ -55,7 +57,7 @@ fn opaque_slice_shows_the_value_and_ends_the_ray() {
     }
     // The first of several is seen, from either side.
     let both = sliced(&ramp(), vec![level(3.0), level(1.0)], SliceStyle::Opaque, false);
-    certify(&[both.clone()], &along_z(0.3, 0.4), [0.0, 0.0, 0.25, 1.0]);
+    certify(std::slice::from_ref(&both), &along_z(0.3, 0.4), [0.0, 0.0, 0.25, 1.0]);
     certify(&[both], &one_ray(DVec3::new(0.3, 0.4, 9.0), DVec3::new(0.3, 0.4, 0.0)), [0.0, 0.0, 0.75, 1.0]);
 }
 
@@ -284,6 +286,60 @@ proptest! {
         // The pixel's centre is off the target by what the camera rounds.
         let made = picture(&[shape], &one_ray(DVec3::from(from), target));
         enclose(&made, [alpha * grey, alpha * grey, alpha * grey, alpha], 1e-12, 1e-12);
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    /// In a cell whose opacity is a cubic along the ray: the part before, the slice, the part
+    /// behind, each integrated on its own.
+    #[test]
+    fn slice_in_a_curved_medium_has_both_parts_around_it(
+        corner in prop::array::uniform8(0.0..1.0f64),
+        from in prop::array::uniform2(0.05..0.95f64),
+        to in prop::array::uniform2(0.05..0.95f64),
+        place in 0.05..0.95f64,
+        unit in 0.05..2.0f64,
+        walled in any::<bool>(),
+    ) {
+        let points = [
+            point(0.1, [0.1, 0.4, 0.9], 0.0),
+            point(0.4, [0.9, 0.5, 0.1], 0.6),
+            point(0.6, [0.2, 0.8, 0.3], 0.05),
+            point(1.0, [0.7, 0.7, 0.2], 0.95),
+        ];
+        let (from, to) = ([from[0], from[1], 0.0], [to[0], to[1], 1.0]);
+        let middle = [0, 1, 2].map(|a| from[a] + (to[a] - from[a]) * place);
+        let length = (DVec3::from(to) - DVec3::from(from)).length();
+        let before = truth(&corner, from, middle, length * place, unit, &points);
+        let behind = truth(&corner, middle, to, length * (1.0 - place), unit, &points);
+        let weight = |i: usize| (0..3).map(|a| if i >> a & 1 == 1 { middle[a] } else { 1.0 - middle[a] }).product::<f64>();
+        let value = (0..8).map(|i| corner[i] * weight(i)).sum::<f64>();
+        let look = table(&points).resolve([0.0, 1.0]).classify(value);
+        let shape = lut(&volume([2; 3], corner.to_vec()), table(&points), unit);
+        let made = sliced(&shape, vec![level(middle[2])], SliceStyle::Blended, true);
+        let direction = (DVec3::from(to) - DVec3::from(from)).normalize();
+        let eye = DVec3::from(from) - 2.0 * direction;
+        let mut frame = one_ray(eye, DVec3::from(to) + direction);
+        let mut expected = [0.0; 4];
+        for (c, expected) in expected.iter_mut().enumerate() {
+            let light = if c < 3 { look[c] * look[3] } else { look[3] };
+            // An application's wall right behind the slice hides the part behind it.
+            let rest = if walled { 0.0 } else { behind[c] };
+            *expected = before[c] + (1.0 - before[3]) * (light + (1.0 - look[3]) * rest);
+        }
+        if walled {
+            let distance = (2.0 + length * place) as f32;
+            let after = f64::from(distance) - 2.0 - length * place;
+            prop_assume!(after >= 0.0);
+            let depth = OpaqueDepth::Distance(vec![distance].into());
+            frame = frame.with_opaque(Opaque { color: None, depth });
+            // What is between, at most 2e-7, is all that the truth leaves out.
+            enclose(&picture(&[made], &frame), expected, 1e-9, after / unit * 3.0 + 1e-10);
+        } else {
+            enclose(&picture(&[made], &frame), expected, 1e-9, 1e-10);
+        }
     }
 }
 
