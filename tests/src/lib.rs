@@ -4,6 +4,7 @@
 //! order: closed form, then the certified `reference`, then `reference` on the action's own
 //! lattice. A tolerance says next to it what sets it.
 
+pub mod meshes;
 pub mod metrics;
 pub mod rig;
 pub mod rules;
