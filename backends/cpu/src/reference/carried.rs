@@ -28,6 +28,7 @@ const VAGUE: f64 = 1e-3;
 
 /// What a mesh carries.
 #[derive(Clone, Debug)]
+#[expect(clippy::large_enum_variant, reason = "there is one a shape")]
 pub(super) enum Carried {
     /// Numbers at the vertices, one list for each field of the medium.
     Numbers(Vec<Vec<f64>>),
