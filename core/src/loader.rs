@@ -72,7 +72,7 @@ impl Progress for NoProgress {
     }
 }
 
-/// Why a file cannot be read.
+/// Why a file cannot be read, or a picture not be written.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum LoadError {
@@ -83,6 +83,14 @@ pub enum LoadError {
         path: PathBuf,
         /// Why.
         source: std::io::Error,
+    },
+    /// A file cannot be written.
+    #[error("{}: cannot be written", path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: Box<dyn std::error::Error + Send + Sync>,
     },
     /// No loader knows the format.
     #[error("{}: no loader knows this format (starts with {head}); known: {known}", path.display())]
@@ -200,6 +208,16 @@ impl LoadError {
     /// An I/O error about a path.
     pub fn io(path: &Path, source: std::io::Error) -> Self {
         Self::Io { path: path.into(), source }
+    }
+
+    /// What a decoder says about a file.
+    pub fn decode(path: &Path, source: impl std::error::Error + Send + Sync + 'static) -> Self {
+        Self::Decode { path: path.into(), source: Box::new(source) }
+    }
+
+    /// An error about a file that is being written.
+    pub fn write(path: &Path, source: impl std::error::Error + Send + Sync + 'static) -> Self {
+        Self::Write { path: path.into(), source: Box::new(source) }
     }
 
     /// What a file describes is no mesh.

@@ -1,12 +1,12 @@
-//! What the fuzz targets do: open arbitrary bytes as each format, read them whole and by region,
-//! and check what must hold of every file that is accepted.
+//! What the fuzz targets do: open arbitrary bytes as each format, read volumes whole and by region
+//! and meshes whole, and check what must hold of every file that is accepted.
 //!
 //! Files lie in memory. Formats whose header names other files find `a`, `b` and `c` beside it.
 
 use std::path::Path;
 
-use volact_core::{LoadOptions, Region, Volume, loader::NoProgress};
-use volact_files::{Storage, open_in};
+use volact_core::{LoadOptions, Mesh, Region, StructuredMesh, Volume, loader::NoProgress};
+use volact_files::{Storage, open_in, read_mesh_in};
 
 /// Volumes beyond are opened, but not read.
 const READ_LIMIT: usize = 16 << 20;
@@ -37,6 +37,39 @@ fn check(loader: &str, storage: &Storage, path: &str, options: &LoadOptions) {
     }
     assert_eq!(at, part.len());
     Volume::new(desc, whole).expect("what was read is a volume");
+}
+
+/// Reads `path` of `storage` as a mesh and checks what must hold of it.
+fn check_mesh(loader: &str, storage: &Storage, path: &str, options: &LoadOptions) {
+    let Ok(data) = read_mesh_in(storage, loader, Path::new(path), options, &NoProgress) else { return };
+    let vertices = data.geometry.vertex_count().expect("a mesh from a file knows its vertices");
+    for attribute in &data.attributes {
+        assert_eq!(attribute.len(), vertices);
+        assert_eq!(attribute.data.bytes().as_ptr().addr() % attribute.scalar.size(), 0);
+        attribute.value(vertices - 1, attribute.components - 1);
+    }
+    if let Some(surface) = data.geometry.as_surface() {
+        assert!(!surface.triangles().is_empty());
+        assert!(surface.triangles().iter().flatten().all(|i| (*i as usize) < vertices));
+        assert!(surface.points().iter().all(|p| p.is_finite()));
+        assert!(surface.normals().is_none_or(|n| n.len() == vertices && n.iter().all(|n| n.is_finite())));
+        return;
+    }
+    let any = data.geometry.as_any();
+    let cells = any.downcast_ref::<Mesh>().map(Mesh::cell_count);
+    let cells = cells.or_else(|| any.downcast_ref::<StructuredMesh>().map(|m| m.cells().count()));
+    assert!(cells.expect("a mesh is one of these") > 0);
+    let bounds = data.geometry.bounds();
+    assert!(bounds.min.is_finite() && bounds.max.is_finite());
+    let made = data.geometry.tessellate().expect("a mesh that was accepted can be cut");
+    // The volume of numbers near the largest is not finite, which is not the loader's to say.
+    if bounds.min.abs().max(bounds.max.abs()).max_element() < 1e60 {
+        made.validate(loader).expect("what was cut is right");
+    }
+}
+
+fn single_mesh(loader: &str, path: &str, data: &[u8]) {
+    check_mesh(loader, &Storage::memory([(path, data.to_vec())]), path, &LoadOptions::new());
 }
 
 /// A header with the files it may name.
@@ -105,4 +138,46 @@ pub fn dicom(data: &[u8]) {
         }
         check("dicom", &storage, "d", &options);
     }
+}
+
+/// VTK XML unstructured grids, structured grids and surfaces, by what the bytes say they are.
+pub fn vtk_xml(data: &[u8]) {
+    ["vtu", "vts", "vtp"].iter().for_each(|loader| single_mesh(loader, "m.xml", data));
+}
+
+/// Legacy VTK meshes and surfaces.
+pub fn vtk_mesh(data: &[u8]) {
+    single_mesh("vtk-mesh", "m.vtk", data);
+}
+
+/// PLOT3D: a grid, and beside it the rest of the bytes as a solution.
+pub fn plot3d(data: &[u8]) {
+    let Some((head, rest)) = data.split_first_chunk::<2>() else { return };
+    let (grid, solution) = rest.split_at(usize::from(u16::from_le_bytes(*head)).min(rest.len()));
+    let storage = Storage::memory([("m.xyz", grid.to_vec()), ("m.q", solution.to_vec())]);
+    check_mesh("plot3d", &storage, "m.xyz", &LoadOptions::new());
+    let one = LoadOptions::from([("block".to_owned(), 1i64.into())]);
+    check_mesh("plot3d", &storage, "m.xyz", &one);
+}
+
+/// Exodus II, its last time and its first.
+pub fn exodus(data: &[u8]) {
+    single_mesh("exodus", "m.exo", data);
+    let first = LoadOptions::from([("step".to_owned(), 0i64.into())]);
+    check_mesh("exodus", &Storage::memory([("m.exo", data.to_vec())]), "m.exo", &first);
+}
+
+/// Wavefront OBJ.
+pub fn obj(data: &[u8]) {
+    single_mesh("obj", "m.obj", data);
+}
+
+/// PLY.
+pub fn ply(data: &[u8]) {
+    single_mesh("ply", "m.ply", data);
+}
+
+/// STL.
+pub fn stl(data: &[u8]) {
+    single_mesh("stl", "m.stl", data);
 }

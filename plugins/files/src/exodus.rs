@@ -68,8 +68,7 @@ fn read(storage: &Storage, path: &Path, options: &LoadOptions, progress: &dyn Pr
     let contents = storage.contents(path)?;
     let most = contents.len().saturating_mul(EXPANSION);
     let settings = NcOpenOptions { max_read_bytes: most, max_chunk_bytes: most, ..NcOpenOptions::default() };
-    let netcdf = NcFile::from_owner(Bytes(contents), settings)
-        .map_err(|e| LoadError::Decode { path: path.into(), source: Box::new(e) })?;
+    let netcdf = NcFile::from_owner(Bytes(contents), settings).map_err(|e| LoadError::decode(path, e))?;
     let file = File { path, netcdf };
     let name = name_of(path);
     let mut warnings = Vec::new();

@@ -11,6 +11,7 @@
 //!   region's end and keeping the region only.
 //! - World space of medical formats is LPS.
 
+mod decode;
 mod dicom;
 mod elements;
 mod exodus;

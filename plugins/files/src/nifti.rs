@@ -25,9 +25,10 @@ use volact_core::{
 };
 
 use crate::{
+    decode::decoder,
     fields,
     format::{Format, confidence, name_of},
-    payload::{ByteOrder, Encoding, GridReader, Part, Payload, decoder},
+    payload::{ByteOrder, Encoding, GridReader, Part, Payload},
     storage::Storage,
     world,
 };

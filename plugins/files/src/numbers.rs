@@ -4,7 +4,10 @@ use std::path::Path;
 
 use volact_core::{Attribute, Buffer, LoadError, ScalarType, Warning, WarningCode};
 
-use crate::payload::{ByteOrder, parse_number, swap_bytes};
+use crate::{
+    decode::parse_number,
+    payload::{ByteOrder, swap_bytes},
+};
 
 /// The type of a stored number: one that the engine knows, or an integer of 64 bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

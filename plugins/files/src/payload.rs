@@ -5,13 +5,16 @@
 //! could not possibly hold what the header promises, and memory grows with what is really decoded.
 
 use std::{
-    io::{self, BufRead, BufReader, Read, Seek, SeekFrom},
+    io::{self, BufReader, Read, Seek, SeekFrom},
     path::{Path, PathBuf},
 };
 
 use volact_core::{Buffer, LoadError, Progress, Region, ScalarType, VolumeDesc, VolumeReader, Warning, WarningCode};
 
-use crate::storage::{Input, Storage};
+use crate::{
+    decode::decoder,
+    storage::{Input, Storage},
+};
 
 /// Raw files of at least that many bytes are mapped instead of read.
 pub(crate) const MAP_FROM: usize = 1 << 20;
@@ -168,18 +171,6 @@ impl Payload {
     }
 }
 
-/// A decoder over encoded bytes.
-pub(crate) fn decoder(encoding: Encoding, input: impl BufRead + Send + 'static) -> Box<dyn Read + Send> {
-    match encoding {
-        Encoding::Raw => Box::new(input),
-        Encoding::Gzip => Box::new(flate2::bufread::MultiGzDecoder::new(input)),
-        Encoding::Zlib => Box::new(flate2::bufread::ZlibDecoder::new(input)),
-        Encoding::Bzip2 => Box::new(bzip2::bufread::MultiBzDecoder::new(input)),
-        Encoding::Ascii(scalar) => Box::new(AsciiNumbers { input, scalar, count: 0, pending: Vec::new() }),
-        Encoding::Hex => Box::new(HexBytes { input }),
-    }
-}
-
 enum Stream {
     Raw(Box<dyn Input>),
     Decoded(Box<dyn Read + Send>),
@@ -232,6 +223,11 @@ pub(crate) fn out_of_memory(path: &Path, bytes: usize) -> LoadError {
     LoadError::Unsupported { path: path.into(), what: format!("a region of {bytes} bytes in this memory"), cure }
 }
 
+/// Tells progress; an error if it asks to stop.
+pub(crate) fn advance(path: &Path, progress: &dyn Progress, done: u64, total: u64) -> Result<(), LoadError> {
+    if progress.advance(done, total) { Ok(()) } else { Err(LoadError::Stopped { path: path.into() }) }
+}
+
 /// The warning about bytes beyond the voxels.
 pub(crate) fn surplus(name: &str, bytes: u64) -> Warning {
     let message = format!("{bytes} bytes after the voxels are not read");
@@ -269,13 +265,7 @@ impl GridReader {
         let mut out = reserve(&self.path, if raw { total } else { total.min(CHUNK) })?;
         let mut walk = Walk { payload: &self.payload, part: 0, first: 0, position: 0, stream: None, extra: None };
         for (start, length) in runs(self.desc.dims, region, sample) {
-            walk.read(start, length, &mut out, &mut |done| {
-                if progress.advance(done, total as u64) {
-                    Ok(())
-                } else {
-                    Err(LoadError::Stopped { path: self.path.clone() })
-                }
-            })?;
+            walk.read(start, length, &mut out, &mut |done| advance(&self.path, progress, done, total as u64))?;
         }
         walk.finish()?;
         if let Some(extra) = walk.extra
@@ -325,8 +315,7 @@ impl VolumeReader for GridReader {
             && let Some(mapped) = self.map()?
         {
             let bytes = mapped.len() as u64;
-            let go_on = progress.advance(bytes, bytes);
-            return if go_on { Ok(mapped) } else { Err(LoadError::Stopped { path: self.path.clone() }) };
+            return advance(&self.path, progress, bytes, bytes).map(|()| mapped);
         }
         self.copy(region, progress).map(Buffer::from)
     }
@@ -476,104 +465,5 @@ fn decoded(part: &Part, result: io::Result<u64>, wanted: u64, done: u64) -> Resu
             wanted: part.length + part.skip,
         }),
         Err(e) => Err(LoadError::Decode { path: part.path.clone(), source: Box::new(e) }),
-    }
-}
-
-/// Numbers as text, separated by white space or commas, as native bytes.
-struct AsciiNumbers<R> {
-    input: R,
-    scalar: ScalarType,
-    count: u64,
-    pending: Vec<u8>,
-}
-
-impl<R: BufRead> AsciiNumbers<R> {
-    fn next_word(&mut self) -> io::Result<Option<String>> {
-        let mut word = String::new();
-        while let Some(&byte) = self.input.fill_buf()?.first() {
-            self.input.consume(1);
-            if !(byte.is_ascii_whitespace() || byte == b',') {
-                word.push(char::from(byte));
-                if word.len() > 64 {
-                    return Err(bad_number(self.count, &word, "a number of at most 64 characters"));
-                }
-            } else if !word.is_empty() {
-                break;
-            }
-        }
-        Ok((!word.is_empty()).then_some(word))
-    }
-}
-
-fn bad_number(index: u64, word: &str, wanted: &str) -> io::Error {
-    io::Error::new(io::ErrorKind::InvalidData, format!("number {index} is {word:?}, wanted {wanted}"))
-}
-
-/// Appends a number given as text to `out` in native byte order.
-pub(crate) fn parse_number(word: &str, scalar: ScalarType, out: &mut Vec<u8>) -> bool {
-    macro_rules! put {
-        ($t:ty) => {
-            word.parse::<$t>().map(|v| out.extend_from_slice(&v.to_ne_bytes())).is_ok()
-        };
-    }
-    match scalar {
-        ScalarType::U8 => put!(u8),
-        ScalarType::I8 => put!(i8),
-        ScalarType::U16 => put!(u16),
-        ScalarType::I16 => put!(i16),
-        ScalarType::U32 => put!(u32),
-        ScalarType::I32 => put!(i32),
-        ScalarType::F16 => word.parse().map(|v| out.extend_from_slice(&half::f16::from_f64(v).to_ne_bytes())).is_ok(),
-        ScalarType::F32 => put!(f32),
-        ScalarType::F64 => put!(f64),
-    }
-}
-
-impl<R: BufRead> Read for AsciiNumbers<R> {
-    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
-        while self.pending.len() < out.len().min(4096) {
-            let Some(word) = self.next_word()? else { break };
-            if !parse_number(&word, self.scalar, &mut self.pending) {
-                return Err(bad_number(self.count, &word, &format!("a number of type {}", self.scalar)));
-            }
-            self.count += 1;
-        }
-        let n = self.pending.len().min(out.len());
-        out[..n].copy_from_slice(&self.pending[..n]);
-        self.pending.drain(..n);
-        Ok(n)
-    }
-}
-
-/// Bytes as pairs of hexadecimal digits, white space between them left out.
-struct HexBytes<R> {
-    input: R,
-}
-
-impl<R: BufRead> HexBytes<R> {
-    fn digit(&mut self) -> io::Result<Option<u8>> {
-        loop {
-            let Some(&byte) = self.input.fill_buf()?.first() else { return Ok(None) };
-            self.input.consume(1);
-            match char::from(byte).to_digit(16) {
-                Some(digit) => return Ok(Some(digit as u8)),
-                None if byte.is_ascii_whitespace() => {}
-                None => {
-                    let message = format!("{:?} is no hexadecimal digit", char::from(byte));
-                    return Err(io::Error::new(io::ErrorKind::InvalidData, message));
-                }
-            }
-        }
-    }
-}
-
-impl<R: BufRead> Read for HexBytes<R> {
-    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
-        for (n, byte) in out.iter_mut().enumerate() {
-            let Some(high) = self.digit()? else { return Ok(n) };
-            let Some(low) = self.digit()? else { return Err(io::ErrorKind::UnexpectedEof.into()) };
-            *byte = high << 4 | low;
-        }
-        Ok(out.len())
     }
 }

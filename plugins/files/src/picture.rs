@@ -72,9 +72,9 @@ fn write_png(path: &Path, width: usize, height: usize, pixels: &[[f32; 4]], sixt
         let mut encoder = png::Encoder::new(BufWriter::new(file), w, h);
         encoder.set_color(png::ColorType::Rgba);
         encoder.set_depth(if sixteen { png::BitDepth::Sixteen } else { png::BitDepth::Eight });
-        let mut writer = encoder.write_header().map_err(|e| encode(path, e))?;
-        writer.write_image_data(&bytes).map_err(|e| encode(path, e))?;
-        writer.finish().map_err(|e| encode(path, e))
+        let mut writer = encoder.write_header().map_err(|e| LoadError::write(path, e))?;
+        writer.write_image_data(&bytes).map_err(|e| LoadError::write(path, e))?;
+        writer.finish().map_err(|e| LoadError::write(path, e))
     })
 }
 
@@ -103,7 +103,7 @@ pub fn save_exr(path: &Path, frame: &Frame) -> Result<(), LoadError> {
     use ex::WritableImage;
     replace(path, |file| {
         let image = ex::Image::from_layer(layer);
-        image.write().non_parallel().to_buffered(BufWriter::new(file)).map_err(|e| encode(path, e))
+        image.write().non_parallel().to_buffered(BufWriter::new(file)).map_err(|e| LoadError::write(path, e))
     })
 }
 
@@ -123,14 +123,14 @@ pub fn save_npy(path: &Path, frame: &Frame) -> Result<(), LoadError> {
     header.push('\n');
     replace(path, |file| {
         let mut out = BufWriter::new(file);
-        let mut write = |bytes: &[u8]| out.write_all(bytes).map_err(|e| LoadError::io(path, e));
+        let mut write = |bytes: &[u8]| out.write_all(bytes).map_err(|e| LoadError::write(path, e));
         write(b"\x93NUMPY\x01\x00")?;
         write(&(header.len() as u16).to_le_bytes())?;
         write(header.as_bytes())?;
         for value in frame.color.iter().flatten() {
             write(&value.to_le_bytes())?;
         }
-        out.flush().map_err(|e| LoadError::io(path, e))
+        out.flush().map_err(|e| LoadError::write(path, e))
     })
 }
 
@@ -159,13 +159,13 @@ pub fn load_picture(path: &Path) -> Result<Picture, LoadError> {
 fn read_png(path: &Path, file: BufReader<fs::File>) -> Result<Picture, LoadError> {
     let mut decoder = png::Decoder::new_with_limits(file, png::Limits { bytes: MOST_PIXELS as usize * 8 });
     decoder.set_transformations(png::Transformations::EXPAND | png::Transformations::ALPHA);
-    let mut reader = decoder.read_info().map_err(|e| encode(path, e))?;
+    let mut reader = decoder.read_info().map_err(|e| LoadError::decode(path, e))?;
     let (width, height) = (reader.info().width as usize, reader.info().height as usize);
     check_pixels(path, width as u64, height as u64)?;
     let bytes = reader.output_buffer_size().unwrap_or(usize::MAX);
     let mut data = crate::payload::reserve(path, bytes)?;
     data.resize(bytes, 0u8);
-    let info = reader.next_frame(&mut data).map_err(|e| encode(path, e))?;
+    let info = reader.next_frame(&mut data).map_err(|e| LoadError::decode(path, e))?;
     let values: Vec<f32> = match info.bit_depth {
         png::BitDepth::Sixteen => {
             data.chunks_exact(2).map(|b| f32::from(u16::from_be_bytes([b[0], b[1]])) / 65535.0).collect()
@@ -200,7 +200,7 @@ fn read_exr(path: &Path, file: BufReader<fs::File>) -> Result<Picture, LoadError
         .all_attributes()
         .non_parallel()
         .from_buffered(file)
-        .map_err(|e| encode(path, e))?;
+        .map_err(|e| LoadError::decode(path, e))?;
     let picture = image.layer_data.channel_data.pixels;
     check_pixels(path, picture.width as u64, picture.height as u64)?;
     Ok(picture)
@@ -251,11 +251,6 @@ fn size(path: &Path, width: usize, height: usize, pixels: &[[f32; 4]]) -> Result
     }
 }
 
-fn encode(path: &Path, source: impl std::error::Error + Send + Sync + 'static) -> LoadError {
-    LoadError::Decode { path: path.into(), source: Box::new(source) }
-}
-
-/// Writes a file under a temporary name in the same folder and renames it when it is complete.
 /// The files that pictures are being written to, or `None` when no more may be begun.
 static UNFINISHED: Mutex<Option<Vec<PathBuf>>> = Mutex::new(Some(Vec::new()));
 
@@ -282,15 +277,16 @@ fn finish(temporary: &Path) {
     unfinished.iter_mut().for_each(|paths| paths.retain(|path| path != temporary));
 }
 
+/// Writes a file under a temporary name in the same folder and renames it when it is complete.
 fn replace(path: &Path, write: impl FnOnce(&mut fs::File) -> Result<(), LoadError>) -> Result<(), LoadError> {
     let temporary = temporary_name(path);
     let result = begin(&temporary)
-        .map_err(|e| LoadError::io(&temporary, e))
+        .map_err(|e| LoadError::write(&temporary, e))
         .and_then(|mut file| {
             write(&mut file)?;
-            file.sync_all().map_err(|e| LoadError::io(&temporary, e))
+            file.sync_all().map_err(|e| LoadError::write(&temporary, e))
         })
-        .and_then(|()| fs::rename(&temporary, path).map_err(|e| LoadError::io(path, e)));
+        .and_then(|()| fs::rename(&temporary, path).map_err(|e| LoadError::write(path, e)));
     if result.is_err() {
         _ = fs::remove_file(&temporary);
     }

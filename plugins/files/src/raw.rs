@@ -89,8 +89,7 @@ fn open(storage: &Storage, path: &Path, _: &LoadOptions) -> Result<Box<dyn Volum
         return Err(LoadError::invalid(path, "header", "longer", format!("at most {HEADER_LIMIT} bytes")));
     }
     let parser = ron::Options::default().with_default_extension(ron::extensions::Extensions::IMPLICIT_SOME);
-    let header: RawVolume =
-        parser.from_bytes(&bytes).map_err(|e| LoadError::Decode { path: path.into(), source: Box::new(e) })?;
+    let header: RawVolume = parser.from_bytes(&bytes).map_err(|e| LoadError::decode(path, e))?;
     let (x, y, z) = header.dims;
     let dims = fields::dimensions(path, "dims", &[x, y, z])?;
     let Some(scalar) = ScalarType::from_name(&header.scalar) else {

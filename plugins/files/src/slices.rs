@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use volact_core::{Buffer, LoadError, Progress, Region, ScalarType, VolumeDesc, VolumeReader, Warning};
 
-use crate::payload::{check_region, crop_slice, reserve};
+use crate::payload::{advance, check_region, crop_slice, reserve};
 
 /// What all slices of a series share.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -70,9 +70,7 @@ impl<S: SliceSource> VolumeReader for SliceReader<S> {
                 out = reserve(&self.path, total)?;
             }
             crop_slice(&slice, nx, region, sample, &mut out);
-            if !progress.advance(out.len() as u64, total as u64) {
-                return Err(LoadError::Stopped { path: self.path.clone() });
-            }
+            advance(&self.path, progress, out.len() as u64, total as u64)?;
         }
         Ok(out.into())
     }

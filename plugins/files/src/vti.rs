@@ -23,7 +23,9 @@ use crate::{
     fields,
     format::{Format, confidence, name_of, text},
     numbers::NumberType,
-    payload::{ByteOrder, Encoding, GridReader, Part, Payload, check_region, reserve, runs, swap_bytes, validate},
+    payload::{
+        ByteOrder, Encoding, GridReader, Part, Payload, advance, check_region, reserve, runs, swap_bytes, validate,
+    },
     storage::Storage,
     vtk::array_option,
     vtk_blocks::{Blocks, Place, locate},
@@ -173,9 +175,7 @@ impl VolumeReader for BlockReader {
                 out.extend_from_slice(&block[from as usize..(from + take) as usize]);
                 start += take;
                 current = Some((n, block));
-                if !progress.advance(out.len() as u64, total as u64) {
-                    return Err(LoadError::Stopped { path: self.path.clone() });
-                }
+                advance(&self.path, progress, out.len() as u64, total as u64)?;
             }
         }
         if self.order != ByteOrder::NATIVE {

@@ -12,7 +12,8 @@ use base64::{Engine, engine::general_purpose::STANDARD};
 use volact_core::LoadError;
 
 use crate::{
-    payload::{Encoding, decoder},
+    decode::decoder,
+    payload::Encoding,
     storage::{Input, Storage},
     vtk_xml::{Array, Document},
 };
@@ -53,14 +54,12 @@ impl Compressor {
             Self::Zlib => {
                 let input: Box<dyn Input> = Box::new(Cursor::new(stored));
                 let mut limited = decoder(Encoding::Zlib, BufReader::new(input)).take(wanted + 1);
-                limited
-                    .read_to_end(&mut out)
-                    .map_err(|e| LoadError::Decode { path: path.into(), source: Box::new(e) })?;
+                limited.read_to_end(&mut out).map_err(|e| LoadError::decode(path, e))?;
             }
             Self::Lz4 => {
                 out.resize(wanted as usize, 0);
-                let length = lz4_flex::block::decompress_into(&stored, &mut out)
-                    .map_err(|e| LoadError::Decode { path: path.into(), source: Box::new(e) })?;
+                let length =
+                    lz4_flex::block::decompress_into(&stored, &mut out).map_err(|e| LoadError::decode(path, e))?;
                 out.truncate(length);
             }
         }
@@ -197,9 +196,7 @@ fn decode_base64(path: &Path, mut text: Vec<u8>, prefix: bool) -> Result<Vec<u8>
     while !rest.is_empty() {
         let end = rest.iter().position(|b| *b == b'=').map_or(rest.len(), |at| (at / 4 + 1) * 4).min(rest.len());
         let (stream, after) = rest.split_at(end);
-        STANDARD
-            .decode_vec(stream, &mut bytes)
-            .map_err(|e| LoadError::Decode { path: path.into(), source: Box::new(e) })?;
+        STANDARD.decode_vec(stream, &mut bytes).map_err(|e| LoadError::decode(path, e))?;
         rest = after;
     }
     Ok(bytes)

@@ -8,7 +8,7 @@ use samples::{DIMS, Sample, all};
 use volact_core::{
     LoadError, ParameterValue, Progress, Region, ScalarType, Volume, VolumeReader,
     glam::DVec3,
-    loader::{Confidence, LoadOptions, NoProgress, Probe},
+    loader::{Confidence, Content, LoadOptions, NoProgress, Probe},
 };
 use volact_files::{Storage, loaders, open_in};
 
@@ -333,8 +333,12 @@ fn large_raw_file_on_disk_is_mapped() {
 fn directories_and_missing_files_are_errors_not_hangs() {
     let folder = tempfile::tempdir().unwrap();
     for loader in loaders() {
-        let error = loader.open(&folder.path().join("missing"), &LoadOptions::new()).err().unwrap();
+        let open = |path: &Path| match loader.content() {
+            Content::Volume => loader.open(path, &LoadOptions::new()).map(drop),
+            Content::Mesh => loader.read_mesh(path, &LoadOptions::new(), &NoProgress).map(drop),
+        };
+        let error = open(&folder.path().join("missing")).err().unwrap();
         assert!(error.to_string().ends_with("missing: cannot be read"), "{error}");
-        assert!(loader.open(folder.path(), &LoadOptions::new()).is_err());
+        assert!(open(folder.path()).is_err());
     }
 }

@@ -159,3 +159,24 @@ fn same(data: &MeshData, whole: &MeshData) -> bool {
 fn digits(loader: &str, data: &MeshData, whole: &MeshData) -> bool {
     loader == "vtk-mesh" && data.geometry.vertex_count() == whole.geometry.vertex_count()
 }
+
+/// Writes all samples as a first corpus for `fuzz/`, if `VOLACT_SEEDS` names a folder.
+#[test]
+fn seeds_are_written_where_asked() {
+    let Some(folder) = std::env::var_os("VOLACT_SEEDS") else { return };
+    for (n, (loader, path, files)) in samples().into_iter().enumerate() {
+        let target = match loader.as_str() {
+            "vtu" | "vts" | "vtp" => "vtk_xml",
+            "vtk-mesh" => "vtk_mesh",
+            other => other,
+        };
+        let target = Path::new(&folder).join(target);
+        fs::create_dir_all(&target).unwrap();
+        let mut bytes = files[0].1.clone();
+        if loader == "plot3d" {
+            bytes.splice(0..0, (files[0].1.len() as u16).to_le_bytes());
+            bytes.extend(&files[1].1);
+        }
+        fs::write(target.join(format!("{n}_{path}")), bytes).unwrap();
+    }
+}

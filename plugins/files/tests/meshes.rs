@@ -397,3 +397,39 @@ fn each_file_is_claimed_by_its_loader_alone() {
         loaders().iter().filter(|l| l.probe(&probe) != Confidence::No).map(|l| l.declaration().name.clone()).collect();
     assert_eq!(claims, ["vtk"]);
 }
+
+/// Raw arrays of at least 1 MiB, aligned and in native order, are mapped and not copied: the file
+/// shows among the process's mappings while the mesh lives.
+#[test]
+#[cfg(target_os = "linux")]
+fn large_raw_arrays_on_disk_are_mapped() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("mapped-mesh.vtu");
+    let count = 1usize << 19;
+    let spec = Spec {
+        points: (0..count).map(|i| [i as f32, (i * i) as f32, 1.0]).collect(),
+        cells: vec![(10, vec![0, 1, 2, 4])],
+        attributes: vec![("s".into(), 1, (0..count).map(|i| i as f32).collect())],
+    };
+    let big = cfg!(target_endian = "big");
+    let settings = Xml { mode: 2, compressor: 0, big, wide_header: false, wide_ids: false, block: 1 };
+    let file = vtu(&spec, settings);
+    // The first array begins four bytes after the underscore; blanks before it align it.
+    let at = file.windows(4).position(|w| w == b"   _").unwrap();
+    let blanks = vec![b' '; (4 - (at + 4) % 4) % 4];
+    let file = [&file[..at], &blanks, &file[at..]].concat();
+    std::fs::write(&path, &file).unwrap();
+    let mapped = || std::fs::read_to_string("/proc/self/maps").unwrap().contains("mapped-mesh.vtu");
+    let read = volact_core::loader::load_mesh(
+        loaders().iter().find(|l| l.declaration().name == "vtu").unwrap().as_ref(),
+        &path,
+        &LoadOptions::new(),
+        &NoProgress,
+    )
+    .unwrap();
+    assert_eq!(read.attribute("s").unwrap().data.as_slice::<f32>().unwrap(), spec.attributes[0].2);
+    assert_eq!(mesh(&read).points().at(7).y, 49.0);
+    assert!(mapped());
+    drop(read);
+    assert!(!mapped());
+}

@@ -95,7 +95,10 @@ fn failed_writing_leaves_nothing_behind_and_success_only_the_picture() {
     // A folder in the way of the picture: the rename fails.
     fs::create_dir(folder.path().join("c.exr")).unwrap();
     fs::write(folder.path().join("c.exr/x"), "").unwrap();
-    save_exr(&folder.path().join("c.exr"), &good).unwrap_err();
+    let error = save_exr(&folder.path().join("c.exr"), &good).unwrap_err().to_string();
+    assert!(error.ends_with("c.exr: cannot be written"), "{error}");
+    let error = save_png(&folder.path().join("nowhere/d.png"), &good, PngOptions::default()).unwrap_err().to_string();
+    assert!(error.ends_with(": cannot be written"), "{error}");
     let mut names: Vec<_> = fs::read_dir(folder.path()).unwrap().map(|e| e.unwrap().file_name()).collect();
     names.sort();
     assert_eq!(names, ["a.exr", "a.png", "c.exr"]);

@@ -10,7 +10,7 @@ use std::path::Path;
 
 use volact_core::{LoadError, Progress, Warning, WarningCode};
 
-use crate::storage::Storage;
+use crate::{payload::advance, storage::Storage};
 
 pub(crate) use attributes::{Attributes, Named, merge};
 pub(crate) use cells::{CellArrays, CellLayout, Cells, codes, mesh_of};
@@ -58,9 +58,6 @@ impl<'a> Meter<'a> {
         let share = self.done as f64 + part.min(of) as f64 / of.max(1) as f64;
         let done = (self.total as f64 * share / self.steps as f64) as u64;
         let done = if self.done == self.steps { self.total } else { done.min(self.total) };
-        if self.progress.advance(done, self.total) {
-            return Ok(());
-        }
-        Err(LoadError::Stopped { path: self.path.into() })
+        advance(self.path, self.progress, done, self.total)
     }
 }

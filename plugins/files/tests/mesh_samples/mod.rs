@@ -392,8 +392,11 @@ pub fn tetrahedron() -> Vec<[[f32; 3]; 3]> {
     [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]].map(|f| f.map(|i: usize| p[i])).to_vec()
 }
 
-/// Loader, path and files of one valid mesh of each kind.
-pub fn all() -> Vec<(&'static str, &'static str, Vec<(&'static str, Vec<u8>)>)> {
+/// Loader, path and files.
+pub type Sample = (&'static str, &'static str, Vec<(&'static str, Vec<u8>)>);
+
+/// One valid mesh of each kind.
+pub fn all() -> Vec<Sample> {
     let one = |loader, path, bytes| (loader, path, vec![(path, bytes)]);
     let xml = |mode, compressor, big| {
         one("vtu", "m.vtu", vtu(&small(), Xml { mode, compressor, big, wide_header: big, wide_ids: !big, block: 48 }))
