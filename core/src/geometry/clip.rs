@@ -158,7 +158,7 @@ impl Clip {
         self.regions.iter().all(|r| {
             let inside = r.planes.iter().all(|p| p.distance(point) >= 0.0);
             let deep = r.planes.iter().all(|p| p.distance(point) > 0.0);
-            if r.keep { inside } else { !deep || r.planes.is_empty() }
+            if r.keep { inside } else { !deep }
         })
     }
 
@@ -259,6 +259,16 @@ mod tests {
         let mut spans = Spans::one(-5.0, 5.0);
         cut_box().apply(DVec3::new(0.0, 0.5, 0.5), DVec3::X, &mut spans);
         assert_eq!(spans.as_slice(), [[-5.0, 0.0], [1.0, 5.0]]);
+    }
+
+    #[test]
+    fn a_region_of_no_planes_is_all_of_space() {
+        for (region, left) in [(ClipRegion::planes([]), 2.0), (ClipRegion::planes([]).cut(), 0.0)] {
+            let clip = Clip::new([region]);
+            let mut spans = Spans::one(-1.0, 1.0);
+            clip.apply(DVec3::ZERO, DVec3::X, &mut spans);
+            assert_eq!((spans.length(), clip.contains(DVec3::ZERO)), (left, left > 0.0));
+        }
     }
 
     #[test]
