@@ -30,7 +30,9 @@ pub struct Bend<'a> {
 #[derive(Clone, Copy, Debug)]
 struct Link {
     t: [f64; 2],
-    at: [DVec3; 2],
+    /// Sample coordinates at its beginning, and their change with `t`.
+    from: DVec3,
+    slope: DVec3,
 }
 
 /// Where sixteen rays are in sample space.
@@ -53,7 +55,10 @@ impl Bent {
                 let [t0, t1] = crossing.span;
                 let place = |part: f64| if part >= 1.0 { t1 } else { t0 + part * (t1 - t0) };
                 let sample = |part: f64| bend.first + bend.size * (at[0] + (at[1] - at[0]) * part);
-                links.push(Link { t: [place(a), place(b)], at: [sample(a), sample(b)] });
+                let (t, at) = ([place(a), place(b)], [sample(a), sample(b)]);
+                if t[0] < t[1] {
+                    links.push(Link { t, from: at[0], slope: (at[1] - at[0]) / (t[1] - t[0]) });
+                }
             }
             ControlFlow::Continue(())
         });
@@ -71,35 +76,34 @@ impl Bent {
 
     /// Sample coordinates of a lane at `t`, which lies on one of its stretches.
     pub fn at(&self, l: usize, t: f64) -> DVec3 {
+        let after = self.links[l].partition_point(|link| link.t[0] <= t);
+        self.links[l].get(after.saturating_sub(1)).map_or(DVec3::ZERO, |link| link.at(t))
+    }
+
+    /// The same, from a link not behind it on; `from` becomes the link.
+    fn at_from(&self, l: usize, t: f64, from: &mut usize) -> DVec3 {
         let links = &self.links[l];
-        let after = links.partition_point(|link| link.t[0] <= t);
-        let Some(link) = links.get(after.saturating_sub(1)) else { return DVec3::ZERO };
-        let [t0, t1] = link.t;
-        let part = if t1 > t0 { ((t - t0) / (t1 - t0)).clamp(0.0, 1.0) } else { 0.0 };
-        link.at[0].lerp(link.at[1], part)
+        while links.get(*from + 1).is_some_and(|next| next.t[0] <= t) {
+            *from += 1;
+        }
+        links.get(*from).map_or(DVec3::ZERO, |link| link.at(t))
+    }
+}
+
+impl Link {
+    /// Sample coordinates at `t`, or at the nearer end.
+    fn at(&self, t: f64) -> DVec3 {
+        self.from + self.slope * (t.clamp(self.t[0], self.t[1]) - self.t[0])
     }
 }
 
 impl Bent {
-    /// What whole segments would add by what lies at one `t` a lane.
-    fn classify(&self, job: &Job<'_>, live: u32, t: impl Fn(usize) -> f64) -> Row {
-        let (base, local) = self.local(&job.voxels, live, t);
+    /// What whole segments would add by what lies at positions of lanes.
+    fn classify(&self, job: &Job<'_>, live: u32, at: impl FnMut(usize) -> DVec3) -> Row {
+        let (base, local) = local(&job.voxels, live, at);
         let mut entries = [[0f32; 4]; LANES];
         dispatch::classify(job.unit, job, &base, &local, live, &mut entries);
         entries
-    }
-
-    /// Positions of lanes relative to a base near the first of them.
-    pub fn local(&self, voxels: &Voxels<'_>, live: u32, t: impl Fn(usize) -> f64) -> (Base, [[f32; LANES]; 3]) {
-        let lanes = || (0..LANES).filter(|l| live >> l & 1 == 1);
-        let first = lanes().next().map_or(DVec3::ZERO, |l| self.at(l, t(l)));
-        let base = Base::new(voxels, first.to_array());
-        let mut local = [[0f32; LANES]; 3];
-        for l in lanes() {
-            let at = self.at(l, t(l)).to_array();
-            (0..3).for_each(|a| local[a][l] = (at[a] - f64::from(base.at[a])) as f32);
-        }
-        (base, local)
     }
 
     /// What whole segments would add by what cut segments hold, and the lanes in which there is
@@ -108,7 +112,7 @@ impl Bent {
         let wanted = (0..LANES).fold(0, |w, l| w | u32::from(cut[l][0] < cut[l][1]) << l) & !done;
         counts.samples += u64::from(wanted.count_ones());
         counts.lattice += u64::from(wanted.count_ones());
-        (self.classify(job, wanted, |l| 0.5 * (cut[l][0] + cut[l][1])), wanted)
+        (self.classify(job, wanted, |l| self.at(l, 0.5 * (cut[l][0] + cut[l][1]))), wanted)
     }
 
     /// Gathers the whole segments of one stretch in the chunk that begins with segment `first`;
@@ -123,6 +127,10 @@ impl Bent {
         counts: &mut Counts,
     ) -> i64 {
         let Some([_, last]) = cuts.whole() else { return i64::MAX };
+        let start = first as f64 * job.lattice.step;
+        let mut from: [usize; LANES] = std::array::from_fn(|l| {
+            self.links[l].partition_point(|link| link.t[0] <= start).saturating_sub(1)
+        });
         for row in 0..CHUNK {
             let k = first + row as i64;
             let inside = |l: usize| cuts.from[l] <= k as f64 && (k as f64) < cuts.to[l];
@@ -130,12 +138,30 @@ impl Bent {
             if live != 0 {
                 counts.samples += u64::from(live.count_ones());
                 let middle = (k as f64 + 0.5) * job.lattice.step;
-                chunk.put(row, &self.classify(job, live, |_| middle));
+                chunk.put(row, &self.classify(job, live, |l| self.at_from(l, middle, &mut from[l])));
             }
         }
         let next = first + CHUNK as i64;
         if next >= last { i64::MAX } else { next }
     }
+}
+
+/// Positions of lanes relative to a base near the first of them.
+pub fn local(
+    voxels: &Voxels<'_>,
+    live: u32,
+    mut at: impl FnMut(usize) -> DVec3,
+) -> (Base, [[f32; LANES]; 3]) {
+    let mut places = [DVec3::ZERO; LANES];
+    (0..LANES).filter(|l| live >> l & 1 == 1).for_each(|l| places[l] = at(l));
+    let base = Base::new(voxels, places[(live.trailing_zeros() as usize).min(LANES - 1)].to_array());
+    let mut local = [[0f32; LANES]; 3];
+    for a in 0..3 {
+        for (local, place) in local[a].iter_mut().zip(&places) {
+            *local = (place[a] - f64::from(base.at[a])) as f32;
+        }
+    }
+    (base, local)
 }
 
 /// The part, between 0 and 1, of a line from one place to another that lies in the unit cube.

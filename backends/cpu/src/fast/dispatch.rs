@@ -4,7 +4,6 @@
 use volact_core::camera::LinearRays;
 
 use super::{
-    direct,
     fetch::{self, Access, Base, Fetch, Voxels},
     over::{self, Classes, Pixels},
     packet::{Bundle, Cuts, Packet, Place, Span},
@@ -199,19 +198,6 @@ by_unit! {
     /// The numbers at positions relative to a base.
     numbers(voxels: &Voxels<'_>, base: &Base, local: &Local, out: &mut [f32; LANES]),
     S => numbers_by::<S>(voxels, base, local, out)
-}
-
-/// # Safety
-/// None of its own: it is unsafe so that it is called like the kernels.
-#[inline(always)]
-unsafe fn absorbed_by(opacity: &[f32; LANES], length: f64, out: &mut [f32; LANES]) {
-    direct::absorbed(opacity, length, out);
-}
-
-by_unit! {
-    /// What lengths absorb, in unit distances, by the opacity over one.
-    absorbed(opacity: &[f32; LANES], length: f64, out: &mut [f32; LANES]),
-    => absorbed_by(opacity, length, out)
 }
 
 by_unit! {

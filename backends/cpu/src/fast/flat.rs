@@ -3,7 +3,7 @@
 use volact_core::{Clip, Compositing, LookupTable, lattice::Lattice, resolve::ResolvedShape, table::ResolvedTable};
 
 use super::{
-    bent::Bent,
+    bent::{Bent, local},
     classify::Units,
     dispatch,
     options::Settings,
@@ -85,7 +85,7 @@ impl<'a> Flat<'a> {
             counts.samples += u64::from(live.count_ones());
             counts.lattice += u64::from(live.count_ones());
             let middle = |l: usize| 0.5 * (segments[l][0] + segments[l][1]);
-            let (base, local) = bent.local(&self.job.voxels, live, middle);
+            let (base, local) = local(&self.job.voxels, live, |l| bent.at(l, middle(l)));
             let mut number = [0f32; LANES];
             dispatch::numbers(unit, &self.job.voxels, &base, &local, &mut number);
             for l in (0..LANES).filter(|l| live >> l & 1 == 1) {

@@ -6,14 +6,16 @@
 //!   unit with fused multiply-add, and for any number of threads.
 //! - Transparent space is skipped ([`bounds`]) and rays end when nothing is left to see; neither
 //!   skipping nor its absence changes a bit.
-//! - What the vector kernels do not do (overlapping shapes, pre-interpolated tables, `simple`) is
-//!   drawn ray by ray in f64 ([`general`]).
-//!
-//! Geometries other than blocks are not drawn yet: an error says so.
+//! - A ray may have several stretches in a shape ([`stretches`]): clips cut them, and meshes
+//!   carve them ([`part`]). Surfaces and the application's picture end rays ([`limits`]).
+//! - Shapes that no ray meets at the same place are drawn one after the other ([`order`]);
+//!   others are put together by their extinctions ([`sweep`]), the same in any order of drawing.
+//! - Numbers at the vertices of a mesh are integrated cell by cell, without a lattice ([`mesh`]).
 
 pub mod action;
 pub mod bent;
 pub mod bounds;
+pub mod carve;
 pub mod check;
 pub mod classify;
 pub mod direct;
@@ -35,6 +37,7 @@ pub mod preintegrate;
 pub mod reduce;
 pub mod resources;
 pub mod sharp;
+pub mod shear;
 pub mod simd;
 pub mod stretches;
 pub mod surface;

@@ -3,12 +3,13 @@
 use std::ops::ControlFlow;
 
 use volact_core::{
-    Aabb, Attribute, Clip, LookupTable, Plane, SliceStyle, geometry::Spans, glam::DVec3, lattice::Lattice,
+    Aabb, Attribute, Clip, LookupTable, Plane, SliceStyle, glam::DVec3, lattice::Lattice,
     resolve::ResolvedShape, table::ResolvedTable,
 };
 
 use super::{
     bent::{Bend, Bent},
+    carve::Carver,
     dispatch,
     medium::Medium,
     mesh::{build::Linked, trace::Crossing},
@@ -103,17 +104,23 @@ impl<'a> Region<'a> {
     }
 
     fn inside(&self, mesh: &Linked, bundle: &Bundle, packet: &Packet, bent: Option<&mut Bent>) -> Stretches {
-        let mut bent = bent.zip(self.bend);
         let rays = bundle.through(&self.place.to_object);
-        let mut lanes: [Spans; LANES] = Default::default();
-        for (l, spans) in lanes.iter_mut().enumerate().filter(|(l, _)| packet.active >> l & 1 == 1) {
-            let (ray, span) = (lane(&rays, l), [packet.start[l], packet.end[l]]);
-            *spans = match &mut bent {
-                Some((bent, bend)) => bent.follow(l, mesh, bend, ray, span),
-                None => mesh.stretches(ray[0], ray[1], span),
-            };
+        let lanes = (0..LANES).filter(|l| packet.active >> l & 1 == 1);
+        let ray = |l: usize| (lane(&rays, l), [packet.start[l], packet.end[l]]);
+        let mut stretches = Stretches::default();
+        if let (Some(bent), Some(bend)) = (bent, &self.bend) {
+            for l in lanes {
+                let (ray, span) = ray(l);
+                stretches.set(l, bent.follow(l, mesh, bend, ray, span).as_slice());
+            }
+        } else {
+            let mut carver = Carver::default();
+            for l in lanes {
+                let ([origin, direction], span) = ray(l);
+                stretches.set(l, carver.stretches(mesh, origin, direction, span));
+            }
         }
-        Stretches::of_lanes(|l| lanes[l].as_slice())
+        stretches
     }
 }
 

@@ -19,17 +19,15 @@ impl Stretches {
         Self { spans: if span.active == 0 { Vec::new() } else { vec![span] } }
     }
 
-    /// Lists of stretches, lane by lane.
-    pub fn of_lanes<'l>(lanes: impl Fn(usize) -> &'l [[f64; 2]]) -> Self {
-        let most = (0..LANES).map(|l| lanes(l).len()).max().unwrap_or(0);
-        let mut spans = vec![Span::NONE; most];
-        for l in 0..LANES {
-            for (span, &[start, end]) in spans.iter_mut().zip(lanes(l)) {
-                (span.start[l], span.end[l]) = (start, end);
-                span.active |= 1 << l;
-            }
+    /// Sets the stretches of a lane that has none, in order.
+    pub fn set(&mut self, l: usize, stretches: &[[f64; 2]]) {
+        if self.spans.len() < stretches.len() {
+            self.spans.resize(stretches.len(), Span::NONE);
         }
-        Self { spans }
+        for (span, &[start, end]) in self.spans.iter_mut().zip(stretches) {
+            (span.start[l], span.end[l]) = (start, end);
+            span.active |= 1 << l;
+        }
     }
 
     /// The stretches that are first, second, … of their rays.

@@ -1,12 +1,13 @@
 //! Opaque triangles: the nearest one that a ray meets.
 //!
-//! Positions are sheared so that the ray becomes the third axis (S. Woop, C. Benthin, I. Wald,
-//! *Watertight ray/triangle intersection*, 2013). The side of an edge on which the ray passes is
-//! the sign of a difference of two products, which is the same for both triangles at the edge;
-//! where it is zero the ray counts as moved by an infinitesimal (δ, δ²), so that a ray along an
-//! edge or through a vertex meets one triangle, and a closed surface has no pinholes.
+//! A ray along an edge or through a vertex meets one of the triangles there ([`shear`]), so that a
+//! closed surface has no pinholes.
+//!
+//! [`shear`]: super::shear
 
 use volact_core::{Aabb, Bvh, Surface, glam::DVec3};
+
+use super::shear::{Shear, meet};
 
 /// Triangles with a tree over them.
 #[derive(Debug)]
@@ -22,44 +23,6 @@ pub struct Meeting {
     pub t: f64,
     /// The surface's normal there, in object space and of any length.
     pub normal: DVec3,
-}
-
-/// A map to a space in which the ray is the third axis and starts at the origin.
-struct Shear {
-    axes: [usize; 3],
-    origin: DVec3,
-    slope: [f64; 2],
-    scale: f64,
-}
-
-impl Shear {
-    fn new(origin: DVec3, direction: DVec3) -> Self {
-        let size = direction.abs();
-        let k = if size.x >= size.y && size.x >= size.z { 0 } else { 1 + usize::from(size.z > size.y) };
-        let axes = [(k + 1) % 3, (k + 2) % 3, k];
-        let scale = 1.0 / direction[k];
-        let slope = [direction[axes[0]] * scale, direction[axes[1]] * scale];
-        Self { axes, origin, slope, scale }
-    }
-
-    fn apply(&self, point: DVec3) -> [f64; 3] {
-        let p = point - self.origin;
-        let [x, y, z] = self.axes.map(|a| p[a]);
-        [x - self.slope[0] * z, y - self.slope[1] * z, z * self.scale]
-    }
-}
-
-/// The edge function, and whether the ray passes on its positive side.
-fn edge(a: &[f64; 3], b: &[f64; 3]) -> (f64, bool) {
-    let e = a[0] * b[1] - a[1] * b[0];
-    let positive = if e != 0.0 {
-        e > 0.0
-    } else if a[1] != b[1] {
-        a[1] > b[1]
-    } else {
-        b[0] > a[0]
-    };
-    (e, positive)
 }
 
 impl Skin {
@@ -90,14 +53,8 @@ impl Skin {
         let mut best: Option<(f64, usize, [f64; 3])> = None;
         self.tree.line(origin, direction, span, |triangle| {
             let corners = self.surface.triangles()[triangle].map(|v| shear.apply(self.surface.points().at(v as usize)));
-            let [a, b, c] = &corners;
-            let (e, f, g) = (edge(b, c), edge(c, a), edge(a, b));
-            if e.1 != f.1 || f.1 != g.1 {
-                return;
-            }
-            let sum = e.0 + f.0 + g.0;
-            let weights = [e.0 / sum, f.0 / sum, g.0 / sum];
-            let t = weights[0] * a[2] + weights[1] * b[2] + weights[2] * c[2];
+            let Some(met) = meet(&corners) else { return };
+            let (t, weights) = (met.t, met.weights);
             // Of triangles in one place the first counts, in whatever order the tree gives them.
             let nearer = best.is_none_or(|(least, i, _)| t < least || t == least && triangle < i);
             if nearer && span[0] <= t && t <= span[1] && keep(t) {

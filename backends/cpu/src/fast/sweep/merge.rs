@@ -4,6 +4,7 @@
 //! weighted by −ln(1 − αᵢ). Where one shape alone can be seen its entry is taken as it is, to the
 //! last bit: shapes that are skipped and shapes that are transparent leave no trace.
 #![expect(unsafe_code, reason = "kernels of a vector unit")]
+#![expect(clippy::needless_range_loop, reason = "a channel indexes several arrays")]
 
 use super::gather::{Chunk, Row};
 use crate::fast::{
@@ -50,23 +51,26 @@ pub unsafe fn merge<S: Simd>(chunks: &[&Chunk], which: Rows, special: u32, sight
     let visible = chunks.iter().fold(0, |all, c| all | c.rows);
     // SAFETY: the caller's promises.
     unsafe {
-        let mut color = sights.color.map(|plane| S::load(&plane));
+        let planes = &sights.color;
+        let mut color = [S::load(&planes[0]), S::load(&planes[1]), S::load(&planes[2]), S::load(&planes[3])];
         for row in (start..end).filter(|row| visible >> row & 1 == 1) {
             let mut entry = [S::splat(0.0); 4];
             // Groups depend on nothing but the shapes, so that what is skipped changes no bit.
             for group in chunks.chunks(GROUP) {
                 let mut rows = [None::<&Row>; GROUP];
                 for (row_of, chunk) in rows.iter_mut().zip(group) {
-                    *row_of = (chunk.rows >> row & 1 == 1).then(|| &chunk.entries[row]);
+                    if chunk.rows >> row & 1 == 1 {
+                        *row_of = Some(&chunk.entries[row]);
+                    }
                 }
                 entry = mixture::<S>(entry, &rows);
             }
             let lanes = which.lanes & if row + 1 == end { !special } else { ALL };
-            entry = entry.map(|plane| S::select(lanes, plane, S::splat(0.0)));
             let before = color[3];
             let left = S::sub(S::splat(1.0), before);
-            for (have, add) in color.iter_mut().zip(entry) {
-                *have = S::fma(left, add, *have);
+            for c in 0..4 {
+                entry[c] = S::select(lanes, entry[c], S::splat(0.0));
+                color[c] = S::fma(left, entry[c], color[c]);
             }
             let fresh = !S::lt_bits(color[3], S::splat(sights.threshold)) & !sights.reached & ALL;
             if fresh != 0 {
@@ -119,23 +123,12 @@ unsafe fn mixture<S: Simd>(first: [S::F; 4], rows: &[Option<&Row>]) -> [S::F; 4]
         if several == 0 {
             return sum;
         }
-        let mut mean = [zero; 3];
-        let mut weight = zero;
-        let mut solid = [zero; 4];
-        let mut add = |entry: [S::F; 4]| {
-            let factor = log_factor::<S>(entry[3]);
-            let opaque = !S::lt_bits(entry[3], one) & ALL;
-            for c in 0..3 {
-                mean[c] = S::add(mean[c], S::mul(factor, entry[c]));
-                solid[c] = S::add(solid[c], S::select(opaque, entry[c], zero));
-            }
-            weight = S::add(weight, S::mul(factor, entry[3]));
-            solid[3] = S::add(solid[3], S::select(opaque, one, zero));
-        };
-        add(first);
+        let mut parts = Parts::<S> { mean: [zero; 3], weight: zero, solid: [zero; 4] };
+        parts.add(first);
         for row in rows.iter().flatten() {
-            add(S::rows(row.as_ptr().cast(), &EACH));
+            parts.add(S::rows(row.as_ptr().cast(), &EACH));
         }
+        let Parts { mean, weight, solid } = parts;
         let scale = S::div(sum[3], S::max(weight, S::splat(f32::MIN_POSITIVE)));
         let opaque = S::lt_bits(zero, solid[3]);
         let share = S::div(one, S::max(solid[3], one));
@@ -145,6 +138,33 @@ unsafe fn mixture<S: Simd>(first: [S::F; 4], rows: &[Option<&Row>]) -> [S::F; 4]
         }
         sum[3] = S::select(opaque & several, one, sum[3]);
         sum
+    }
+}
+
+/// What a mixture is made of.
+struct Parts<S: Simd> {
+    /// Colours weighted by −ln(1 − α), and the sum of weights.
+    mean: [S::F; 3],
+    weight: S::F,
+    /// Colours of what is opaque, and how many there are.
+    solid: [S::F; 4],
+}
+
+impl<S: Simd> Parts<S> {
+    #[inline(always)]
+    unsafe fn add(&mut self, entry: [S::F; 4]) {
+        // SAFETY: the caller's promises.
+        unsafe {
+            let (zero, one) = (S::splat(0.0), S::splat(1.0));
+            let factor = log_factor::<S>(entry[3]);
+            let opaque = !S::lt_bits(entry[3], one) & ALL;
+            for c in 0..3 {
+                self.mean[c] = S::fma(factor, entry[c], self.mean[c]);
+                self.solid[c] = S::add(self.solid[c], S::select(opaque, entry[c], zero));
+            }
+            self.weight = S::fma(factor, entry[3], self.weight);
+            self.solid[3] = S::add(self.solid[3], S::select(opaque, one, zero));
+        }
     }
 }
 
