@@ -280,6 +280,28 @@ fn arrays_in_several_pieces_become_one_mesh() {
     assert_eq!(read.attribute("s").unwrap().value(8, 0), 0.0);
 }
 
+/// Parallel programs write pieces for processes that have nothing.
+#[test]
+fn empty_pieces_are_passed_over() {
+    let empty = Spec {
+        attributes: small().attributes.into_iter().map(|(name, n, _)| (name, n, Vec::new())).collect(),
+        ..Spec::default()
+    };
+    for compressor in [0, 1, 2] {
+        let settings = Xml { mode: 1, compressor, big: true, wide_header: true, wide_ids: true, block: 32 };
+        let text = |spec: &Spec| String::from_utf8(vtu(spec, settings)).unwrap();
+        let (whole, nothing) = (text(&small()), text(&empty));
+        let part = &nothing[nothing.find("<Piece").unwrap()..nothing.find("</UnstructuredGrid>").unwrap()];
+        let both = whole.replace("<UnstructuredGrid>", &format!("<UnstructuredGrid>{part}"));
+        let read = load("vtu", "m.vtu", vec![("m.vtu", both.into())]);
+        assert_eq!((mesh(&read).points().len(), mesh(&read).cell_count()), (8, 3));
+        assert_eq!(read.attributes.len(), 2);
+        let error = load_with("vtu", "m.vtu", vec![("m.vtu", nothing.into())], &LoadOptions::new()).unwrap_err();
+        let wanted = "m.vtu: number of cells that hold volume (of 0) is 0, wanted at least 1";
+        assert_eq!(error.to_string(), wanted);
+    }
+}
+
 #[test]
 fn obj_faces_keep_their_normals_and_flat_ones_get_their_own() {
     let read = load("obj", "m.obj", vec![("m.obj", mesh_samples::OBJ.into())]);

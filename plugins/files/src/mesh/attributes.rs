@@ -32,6 +32,10 @@ impl<'a> Attributes<'a> {
         if name.is_empty() {
             name = format!("attribute {}", self.all.len());
         }
+        // That there are no vertices is said where there should be cells.
+        if vertices == 0 {
+            return Ok(());
+        }
         let wanted = vertices.saturating_mul(components);
         if components == 0 || numbers.len() != wanted {
             let (what, wanted) =
