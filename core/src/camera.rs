@@ -177,6 +177,39 @@ impl Camera {
         Self::perspective(center + towards_eye * distance, center, true_up, fov_y)
     }
 
+    /// A perspective camera (30 degrees) that sees all of some points, from no farther away than it
+    /// must, or than a quarter of their depth; `None` where there are none, or one is not finite.
+    pub fn fit_points(points: &[DVec3], view: View, width: usize, height: usize) -> Option<Self> {
+        let (towards_eye, up) = view.axes();
+        let fov_y: f64 = 30.0;
+        let right = up.cross(towards_eye).normalize();
+        let true_up = towards_eye.cross(right);
+        // Half the width and height at distance 1, less 6 % as a margin.
+        let half = (fov_y / 2.0).to_radians().tan() * 0.94;
+        let slopes = [half * width.max(1) as f64 / height.max(1) as f64, half];
+        let first = *points.first().filter(|_| points.iter().all(|p| p.is_finite()))?;
+        // From an eye at (x, y, d) a point is in the picture where |px − x| ≤ slope·(d − pz), and so
+        // for y: what matters of all points is the highest px + slope·pz and the lowest px − slope·pz.
+        let mut ends = [[f64::NEG_INFINITY, f64::INFINITY]; 2];
+        let mut depth = [f64::INFINITY, f64::NEG_INFINITY];
+        for p in points.iter().map(|p| *p - first) {
+            let z = p.dot(towards_eye);
+            for (end, (slope, along)) in ends.iter_mut().zip(slopes.into_iter().zip([right, true_up])) {
+                let at = p.dot(along);
+                *end = [end[0].max(at + slope * z), end[1].min(at - slope * z)];
+            }
+            depth = [depth[0].min(z), depth[1].max(z)];
+        }
+        let needed = |axis: usize| (ends[axis][0] - ends[axis][1]) / (2.0 * slopes[axis]);
+        let middle = |axis: usize| (ends[axis][0] + ends[axis][1]) / 2.0;
+        let deep = depth[1] - depth[0];
+        let distance = needed(0).max(needed(1)).max(depth[1] + 0.25 * deep);
+        let target = first + right * middle(0) + true_up * middle(1) + towards_eye * depth[0].midpoint(depth[1]);
+        let away = distance - depth[0].midpoint(depth[1]);
+        let eye = target + towards_eye * if away > 0.0 { away } else { 1.0 };
+        (eye.is_finite() && target.is_finite()).then(|| Self::perspective(eye, target, true_up, fov_y))
+    }
+
     /// Prepares the rays of a picture whose viewport is that many pixels.
     ///
     /// # Errors
@@ -493,6 +526,41 @@ mod tests {
                 prop_assert!((p.y / p.z).abs() <= (limit.y / limit.z).abs());
             }
         }
+    }
+
+    proptest! {
+        #[test]
+        fn fitted_points_are_seen_and_touch_the_margin(
+            points in prop::collection::vec(prop::array::uniform3(-10.0..10.0f64), 2..30),
+            far in -1e6..1e6f64,
+            view in 0usize..7,
+            width in 20usize..200,
+        ) {
+            let points: Vec<DVec3> = points.into_iter().map(|p| DVec3::from_array(p) + far).collect();
+            let camera = Camera::fit_points(&points, View::ALL[view].1, width, 64).unwrap();
+            let rays = camera.rays(&viewport(width, 64)).unwrap();
+            let to_view = rays.world_to_view();
+            let limit = to_view.transform_vector3(rays.ray(0.0, 0.0).direction);
+            let place = |c: &DVec3| {
+                let p = to_view.transform_point3(*c);
+                assert!(p.z < 0.0);
+                let [x, y] = [(p.x / p.z / (limit.x / limit.z)).abs(), (p.y / p.z / (limit.y / limit.z)).abs()];
+                x.max(y)
+            };
+            let outermost = points.iter().map(place).fold(0.0, f64::max);
+            let z = points.iter().map(|p| -to_view.transform_point3(*p).z);
+            let [near, far] = z.fold([f64::INFINITY, 0.0], |[a, b], z| [a.min(z), b.max(z)]);
+            prop_assert!(outermost < 0.94 + 1e-6, "{outermost}");
+            prop_assert!(outermost > 0.94 - 1e-6 || near < 0.2501 * (far - near), "{outermost} {near} {far}");
+        }
+    }
+
+    #[test]
+    fn a_point_alone_is_seen_from_somewhere() {
+        let camera = Camera::fit_points(&[DVec3::splat(3.0)], View::Iso, 8, 8).unwrap();
+        assert!(camera.rays(&viewport(8, 8)).is_ok());
+        assert!(Camera::fit_points(&[], View::Iso, 8, 8).is_none());
+        assert!(Camera::fit_points(&[DVec3::ONE, DVec3::NAN], View::Iso, 8, 8).is_none());
     }
 
     #[test]

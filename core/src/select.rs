@@ -44,6 +44,9 @@ fn reasons(refused: &[(String, String)]) -> String {
     refused.iter().map(|(name, why)| format!("{name}: {why}")).collect::<Vec<_>>().join("; ")
 }
 
+/// The reason for a preferred action that nobody registered.
+pub const NOT_REGISTERED: &str = "not registered";
+
 /// Makes the action `named` where there is one; else the first that `config` prefers and that can
 /// draw all shapes. `options` go above those of the config.
 ///
@@ -81,7 +84,7 @@ fn attempt(
     shapes: &[Shape],
 ) -> Result<Box<dyn RenderAction>, String> {
     if !registry.action_names().any(|known| known == name) {
-        return Err("not registered".into());
+        return Err(NOT_REGISTERED.into());
     }
     let mut action = registry.action(name, options).map_err(|e| chain(&e))?;
     let resolved: Result<Vec<_>, _> = shapes.iter().map(|s| ResolvedShape::new(s, registry.shaders())).collect();

@@ -9,15 +9,21 @@
 //!
 //! Segmentations are recognised and get a colour for each label and the nearest sample instead.
 
+mod mesh;
+mod palette;
+mod sight;
 mod statistics;
 
 use std::collections::BTreeSet;
 
 use volact_core::{
-    Aabb, Appearance, Camera, ControlPoint, Filter, FrameDesc, LookupTable, Shape, View, Volume, VolumeTexture,
-    glam::DVec3, shape::smallest_voxel,
+    Aabb, Appearance, ControlPoint, Filter, FrameDesc, LookupTable, Shape, View, Volume, VolumeTexture, glam::DVec3,
+    shape::smallest_voxel,
 };
 
+pub use mesh::{AutomaticMesh, MeshLookError, automatic_mesh};
+
+use sight::{Sight, fit, world_steps};
 use statistics::{Background, Histogram, Statistics};
 
 /// How to show a volume of which nothing else is known.
@@ -29,8 +35,11 @@ pub struct Automatic {
     pub table: Option<LookupTable>,
     /// From where to look.
     pub view: View,
-    /// The world box of what can be seen, which a camera should fit.
+    /// The world box of what can be seen.
     pub subject: Aabb,
+    /// World points around all that can be seen, which a camera should fit: nearer to it than the
+    /// box where the grid stands oblique.
+    pub hull: Vec<DVec3>,
     /// How to interpolate.
     pub filter: Filter,
     /// What was found and chosen, in words.
@@ -38,6 +47,11 @@ pub struct Automatic {
 }
 
 impl Automatic {
+    fn new(shader: &str, table: Option<LookupTable>, sight: Sight, filter: Filter, notes: Vec<String>) -> Self {
+        let Sight { view, bounds, hull } = sight;
+        Self { shader: shader.into(), table, view, subject: bounds, hull, filter, notes }
+    }
+
     /// The volume as a texture with the filter chosen.
     pub fn texture(&self, volume: &Volume) -> VolumeTexture {
         VolumeTexture::new(volume).with_filter(self.filter)
@@ -59,7 +73,7 @@ impl Automatic {
 
     /// A picture over black of the subject from a view of one's own.
     pub fn frame_from(&self, view: View, width: usize, height: usize) -> FrameDesc {
-        FrameDesc::new(Camera::fit(&self.subject, view, width, height), width, height)
+        fit(&self.hull, &self.subject, view, width, height)
     }
 
     /// The volume as a shape that looks so.
@@ -74,9 +88,8 @@ pub fn automatic(volume: &Volume) -> Automatic {
     let components = volume.desc().components;
     if components > 1 {
         let note = format!("{components} components: shown as the colour and opacity that they are");
-        let shader = "simple".into();
-        let subject = whole(volume);
-        return Automatic { shader, table: None, view: View::Iso, subject, filter: Filter::Linear, notes: vec![note] };
+        let sight = Sight::whole(volume);
+        return Automatic::new("simple", None, sight, Filter::Linear, vec![note]);
     }
     let statistics = Statistics::new(volume, 0);
     let mut notes = Vec::new();
@@ -101,12 +114,9 @@ fn constant(volume: &Volume, statistics: &Statistics, mut notes: Vec<String>) ->
     });
     let longest = statistics.dims.into_iter().max().unwrap_or(1) * statistics.stride;
     let table = table(vec![point(value, [0.5, 0.6, 0.7], opacity(0.5, longest as f64))]);
-    let subject = whole(volume);
-    Automatic { shader: "lut".into(), table, view: View::Iso, subject, filter: Filter::Linear, notes }
+    Automatic::new("lut", table, Sight::whole(volume), Filter::Linear, notes)
 }
 
-/// A subject this much thinner along one axis than along both others is seen along it.
-const FLAT: f64 = 0.6;
 /// Optical depth of a typical line through what is soft and through what is dense.
 const DEPTH: [f64; 2] = [1.0, 4.0];
 /// Optical depth of a typical line through a label.
@@ -120,15 +130,15 @@ const WHITE: [f64; 3] = [1.0, 1.0, 1.0];
 fn intensity(volume: &Volume, statistics: &Statistics, mut notes: Vec<String>) -> Automatic {
     let background = statistics.background();
     let inside = |v: f64| background.distance(v) > background.margin;
-    let (view, subject) = choose_view(volume, statistics, inside);
+    let sight = Sight::new(volume, statistics, inside);
     let classes = Classes::new(statistics, &background);
     notes.push(classes.describe(&background));
-    let axis = view_axis(volume, view);
+    let axis = view_axis(volume, sight.view);
     let along = smallest_units(volume, axis) * statistics.stride as f64;
     let soft = statistics.chord(axis, |v| inside(v) && background.distance(v) < classes.split) * along;
     let dense = statistics.chord(axis, |v| background.distance(v) >= classes.split) * along;
     let points = classes.points(&background, opacity(DEPTH[0], soft), opacity(DEPTH[1], dense));
-    Automatic { shader: "lut".into(), table: table(points), view, subject, filter: Filter::Linear, notes }
+    Automatic::new("lut", table(points), sight, Filter::Linear, notes)
 }
 
 /// The subject in two, as distances from the background's value.
@@ -200,8 +210,8 @@ fn segmentation(volume: &Volume, statistics: &Statistics, labels: &BTreeSet<i64>
     let labels = all_labels(volume, labels);
     let shown: Vec<i64> = labels.iter().copied().filter(|l| *l != background).collect();
     notes.push(format!("{} labels besides {background}: a colour for each, nearest sample", shown.len()));
-    let (view, subject) = choose_view(volume, statistics, |v| !v.is_nan() && v as i64 != background);
-    let axis = view_axis(volume, view);
+    let sight = Sight::new(volume, statistics, |v| !v.is_nan() && v as i64 != background);
+    let axis = view_axis(volume, sight.view);
     let along = smallest_units(volume, axis) * statistics.stride as f64;
     let mut points = vec![point(background as f64, [0.0; 3], 0.0)];
     for (index, &label) in shown.iter().enumerate() {
@@ -215,7 +225,7 @@ fn segmentation(volume: &Volume, statistics: &Statistics, labels: &BTreeSet<i64>
             point(value + 0.5, [0.0; 3], 0.0),
         ]);
     }
-    Automatic { shader: "lut".into(), table: table(points), view, subject, filter: Filter::Nearest, notes }
+    Automatic::new("lut", table(points), sight, Filter::Nearest, notes)
 }
 
 /// The labels found in a part of the voxels, and those that the part missed.
@@ -245,52 +255,6 @@ fn distinct_color(index: usize) -> [f64; 3] {
         1.0 - saturation * (1.0 - ramp)
     };
     [channel(0.0), channel(4.0), channel(2.0)]
-}
-
-/// Looks along the axis in which a flat subject is thin, else from in front, the right and above;
-/// at patients (values in HU) straight from in front. And at the box that holds the subject.
-fn choose_view(volume: &Volume, statistics: &Statistics, inside: impl Fn(f64) -> bool) -> (View, Aabb) {
-    let Some(extent) = statistics.extent(inside) else { return (View::Iso, whole(volume)) };
-    let subject = world_box(volume, extent.map(|range| range.map(|i| i * statistics.stride)), 2 * statistics.stride);
-    let steps = world_steps(volume);
-    let count = |a: usize| ((extent[a][1] - extent[a][0] + 1) * statistics.stride) as f64;
-    let size: [f64; 3] = std::array::from_fn(|a| count(a) * steps[a].length());
-    let thin = (0..3).min_by(|a, b| size[*a].total_cmp(&size[*b])).unwrap_or(2);
-    let others = (0..3).filter(|a| *a != thin).map(|a| size[a]).fold(f64::INFINITY, f64::min);
-    if size[thin] > FLAT * others {
-        return (if volume.desc().unit == "HU" { View::Front } else { View::Iso }, subject);
-    }
-    let direction = steps[thin].normalize_or(DVec3::Z).abs();
-    let views = [(View::Top, direction.z), (View::Front, direction.y), (View::Right, direction.x)];
-    (views.into_iter().max_by(|a, b| a.1.total_cmp(&b.1)).map_or(View::Iso, |(view, _)| view), subject)
-}
-
-/// The world box of samples from first to last along each axis, and `rim` more on every side.
-fn world_box(volume: &Volume, samples: [[usize; 2]; 3], rim: usize) -> Aabb {
-    let desc = volume.desc();
-    let corner = |side: usize| {
-        let at = |a: usize| match side {
-            0 => samples[a][0].saturating_sub(rim),
-            _ => (samples[a][1] + rim).min(desc.dims[a] - 1),
-        };
-        DVec3::new(at(0) as f64, at(1) as f64, at(2) as f64) * desc.spacing
-    };
-    let (min, max) = (corner(0), corner(1));
-    // A plane of samples is one spacing thick.
-    let thick = DVec3::select(min.cmpeq(max), desc.spacing / 2.0, DVec3::ZERO);
-    let corners = Aabb::new(min - thick, max + thick).corners().map(|c| desc.placement.transform_point3(c));
-    corners.iter().fold(Aabb::EMPTY, |b, &c| Aabb::new(b.min.min(c), b.max.max(c)))
-}
-
-fn whole(volume: &Volume) -> Aabb {
-    world_box(volume, volume.dims().map(|n| [0, n - 1]), 0)
-}
-
-/// From one sample to the next along each axis, in world space.
-fn world_steps(volume: &Volume) -> [DVec3; 3] {
-    let desc = volume.desc();
-    let axes = [DVec3::X, DVec3::Y, DVec3::Z];
-    std::array::from_fn(|a| desc.placement.transform_vector3(axes[a] * desc.spacing[a]))
 }
 
 /// The axis of the grid that is nearest to the direction of view.

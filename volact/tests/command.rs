@@ -64,7 +64,9 @@ fn help_and_version_read_well() {
     let version = volact(folder.path(), &["--version"]);
     assert_eq!(out(&version), concat!("volact ", env!("CARGO_PKG_VERSION"), "\n"));
     let render = out(&volact(folder.path(), &["render", "--help"]));
-    for word in ["--action", "--size", "--view", "--step", "--threads", "--set", "--option", "Examples"] {
+    for word in
+        ["--action", "--size", "--view", "--step", "--threads", "--set", "--option", "--clip", "--slice", "Examples"]
+    {
         assert!(render.contains(word), "{word} in {render}");
     }
 }
@@ -177,8 +179,22 @@ fn wrong_config_is_an_error_with_its_place() {
 fn describe_lists_and_tells_in_full() {
     let folder = tempfile::tempdir().unwrap();
     let list = out(&volact(folder.path(), &["describe"]));
-    for word in ["actions\n", "\nshaders\n", "\ngeometries\n", "\nloaders\n", "  cpu ", "  lut ", "  block ", "  nrrd "]
-    {
+    for word in [
+        "actions\n",
+        "\nshaders\n",
+        "\ngeometries\n",
+        "\nloaders\n",
+        "  cpu ",
+        "  lut ",
+        "  block ",
+        "  nrrd ",
+        "  attribute ",
+        "  surface ",
+        "  sphere ",
+        "  cylinder ",
+        "  vtu ",
+        "  stl ",
+    ] {
         assert!(list.contains(word), "{word:?} in {list}");
     }
     let lut = out(&volact(folder.path(), &["describe", "lut"]));
@@ -214,4 +230,157 @@ fn log_level_comes_from_the_flag_and_the_environment() {
     assert_eq!(draw(&[], None), "");
     assert!(draw(&["-v"], None).contains("[unit-distance-defaulted]"));
     assert!(draw(&[], Some("debug")).contains("read by loader nrrd"));
+}
+
+/// A mesh of two hexahedra side by side, with numbers that rise along x, and a pyramid of
+/// triangles.
+fn meshes() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let points: Vec<String> = (0..12).map(|i| format!("{} {} {}", i % 3, i / 3 % 2, i / 6)).collect();
+    let numbers = |f: fn(usize) -> f64| (0..12).map(|i| f(i).to_string()).collect::<Vec<_>>().join(" ");
+    let array = |name: &str, components: usize, text: String| {
+        format!(
+            "<DataArray type=\"Float64\" Name=\"{name}\" NumberOfComponents=\"{components}\" format=\"ascii\">{text}</DataArray>\n"
+        )
+    };
+    let indices = |name: &str, text: &str| {
+        format!("<DataArray type=\"Int64\" Name=\"{name}\" format=\"ascii\">{text}</DataArray>\n")
+    };
+    let flow = (0..36).map(|i| (i % 3).to_string()).collect::<Vec<_>>().join(" ");
+    let vtu = format!(
+        "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\">\n\
+         <UnstructuredGrid><Piece NumberOfPoints=\"12\" NumberOfCells=\"2\">\n<PointData>\n{}{}{}</PointData>\n\
+         <Points>\n{}</Points>\n<Cells>\n{}{}{}</Cells>\n</Piece></UnstructuredGrid></VTKFile>\n",
+        array("flow", 3, flow),
+        array("heat", 1, numbers(|i| (i % 3) as f64)),
+        array("height", 1, numbers(|i| (i / 6) as f64)),
+        array("Points", 3, points.join(" ")),
+        indices("connectivity", "0 1 4 3 6 7 10 9 1 2 5 4 7 8 11 10"),
+        indices("offsets", "8 16"),
+        "<DataArray type=\"UInt8\" Name=\"types\" format=\"ascii\">12 12</DataArray>\n",
+    );
+    fs::write(folder.path().join("room.vtu"), vtu).unwrap();
+    let [a, b, c, d] = ["0 0 0", "1 0 0", "0 1 0", "0.3 0.3 1"];
+    let facet = |p: [&str; 3]| {
+        let corners: String = p.iter().map(|p| format!("    vertex {p}\n")).collect();
+        format!("  facet normal 0 0 0\n   outer loop\n{corners}   endloop\n  endfacet\n")
+    };
+    let facets: String = [[a, c, b], [a, b, d], [b, c, d], [c, a, d]].map(facet).concat();
+    fs::write(folder.path().join("part.stl"), format!("solid part\n{facets}endsolid part\n")).unwrap();
+    folder
+}
+
+/// How many pixels of a picture are not black.
+fn lit(path: &Path) -> usize {
+    let picture = volact_files::picture::load_picture(path).unwrap();
+    picture.rgba.iter().filter(|p| p[0] + p[1] + p[2] > 0.02).count()
+}
+
+#[test]
+fn bare_meshes_just_work() {
+    let folder = meshes();
+    let draw = |more: &[&str]| {
+        let arguments = [&["render", "room.vtu", "--size", "40", "--action", "cpu"], more].concat();
+        let output = volact(folder.path(), &arguments);
+        assert_eq!(code(&output), 0, "{}", err(&output));
+        (out(&output), lit(&folder.path().join("room.png")))
+    };
+    let (text, whole) = draw(&["--view", "front"]);
+    for word in ["attribute \"heat\", ", "--attribute NAME shows another of flow, heat, height", "mesh of 12 vertices"]
+    {
+        assert!(text.contains(word), "{word:?} in {text}");
+    }
+    assert!((400..1000).contains(&whole), "{whole} pixels");
+    assert!(draw(&["--attribute", "flow[1]"]).0.contains("component 1 of attribute \"flow\""));
+    let (_, half) = draw(&["--view", "front", "--clip", "x<50%"]);
+    assert!(half.abs_diff(whole / 2) < whole / 10, "{half} of {whole}");
+    let (text, plane) = draw(&["--view", "front", "--slice", "y=50%"]);
+    assert!(text.contains("1 slice planes") && (whole / 2..whole).contains(&plane), "{plane} of {whole}\n{text}");
+    assert_eq!(draw(&["--view", "front", "--slice", "y=7"]).1, 0);
+    let wrong = volact(folder.path(), &["render", "room.vtu", "--attribute", "heta"]);
+    assert!(code(&wrong) == 2 && err(&wrong).contains("did you mean \"heat\"?"), "{}", err(&wrong));
+}
+
+#[test]
+fn bare_surfaces_are_lit() {
+    let folder = meshes();
+    let output = volact(folder.path(), &["render", "part.stl", "--size", "40", "--action", "cpu"]);
+    assert!(code(&output) == 0 && out(&output).contains("4 triangles"), "{}{}", out(&output), err(&output));
+    let picture = volact_files::picture::load_picture(&folder.path().join("part.png")).unwrap();
+    let mut shades: Vec<u32> = picture.rgba.iter().filter(|p| p[0] > 0.0).map(|p| (p[0] * 255.0) as u32).collect();
+    assert!(shades.len() > 200);
+    shades.sort_unstable();
+    shades.dedup();
+    assert!(shades.len() > 1, "faces differ: {shades:?}");
+    for (more, word) in
+        [("--slice=z=50%", "--slice is for volumes and meshes"), ("--attribute=t", "shown in one colour")]
+    {
+        let output = volact(folder.path(), &["render", "part.stl", more]);
+        assert!(code(&output) == 2 && err(&output).contains(word), "{}", err(&output));
+    }
+}
+
+#[test]
+fn info_tells_of_cells_and_attributes() {
+    let folder = meshes();
+    let text = out(&volact(folder.path(), &["info", "room.vtu"]));
+    for fact in [
+        "kind        unstructured mesh\n",
+        "cells       2 hexahedra\n",
+        "volume      2, of a cell 1 to 1\n",
+        "inverted    0\n",
+        "boundary    20 triangles\n",
+        "            heat: 1 × f64, 0 to 2\n",
+    ] {
+        assert!(text.contains(fact), "{fact:?} in {text}");
+    }
+    let json = out(&volact(folder.path(), &["info", "room.vtu", "--json", "--attribute", "height"]));
+    let value: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(value["mesh"]["cells"], serde_json::json!({"hexahedron": 2}));
+    assert_eq!(value["mesh"]["cell_volumes"], serde_json::json!([1.0, 1.0]));
+    assert_eq!(value["range"], serde_json::json!([0.0, 1.0]));
+    let surface = out(&volact(folder.path(), &["info", "part.stl"]));
+    assert!(surface.contains("kind        surface\n") && surface.contains("triangles   4"), "{surface}");
+}
+
+const ROOM: &str = r#"Scene(
+    version: 1,
+    data: {"room": (file: "$VOLACT_DATA/room.vtu")},
+    shapes: [(
+        geometry: Mesh(data: "room"),
+        shader: "attribute",
+        parameters: {
+            "scalars": Attribute(data: "room", name: "heat"),
+            "lookup_table": WindowLevel(window: 2, level: 1, opacity: 0.5),
+        },
+        slices: (planes: [Plane(point: (1, 0, 0), normal: (1, 0, 0))], volume: true),
+    )],
+    image: (size: (20, 20)),
+)"#;
+
+#[test]
+fn data_folders_come_from_the_command_line_or_the_environment() {
+    let (here, data) = (tempfile::tempdir().unwrap(), meshes());
+    fs::write(here.path().join("room.ron"), ROOM).unwrap();
+    let run = |arguments: &[&str], variable: Option<&Path>| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_volact"));
+        command.current_dir(here.path()).args(["render", "room.ron", "--action", "cpu"]).args(arguments);
+        command.env("VOLACT_CONFIG", "").env_remove("VOLACT_DATA").envs(variable.map(|path| ("VOLACT_DATA", path)));
+        command.output().unwrap()
+    };
+    let folder = data.path().to_str().unwrap();
+    assert_eq!(code(&run(&["--data-dir", folder], None)), 0);
+    assert_eq!(code(&run(&[], Some(data.path()))), 0);
+    let none = run(&[], None);
+    assert!(code(&none) == 2 && err(&none).contains("wanted a folder in place of $VOLACT_DATA"), "{}", err(&none));
+    let slices = run(&["--slice", "x=1"], Some(data.path()));
+    assert!(code(&slices) == 2 && err(&slices).contains("are for bare data"), "{}", err(&slices));
+}
+
+#[test]
+fn actions_that_are_not_there_are_news_only_to_those_who_ask() {
+    let folder = folder();
+    let draw = |more: &[&str]| out(&volact(folder.path(), &[&["render", "ball.nrrd", "--size", "8"], more].concat()));
+    assert!(!draw(&[]).contains("not by"));
+    assert!(draw(&["-v"]).contains("not by  wgpu: not registered"));
 }

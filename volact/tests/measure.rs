@@ -99,6 +99,21 @@ fn bench_relates_actions_to_the_first() {
 }
 
 #[test]
+fn bench_takes_what_render_takes() {
+    let arguments = ["bench", "part/scene.ron", "-n", "1", "--warm-up", "0", "--size", "9", "--view", "top", "--json"];
+    let more = ["--step", "0.5", "--set", "unit_distance=2", "-a", "cpu", "-a", "null"];
+    let bench = json(&[&arguments[..], &more[..]].concat());
+    assert_eq!(bench["size"], serde_json::json!([9, 9]));
+    let samples = |step: &str| {
+        let bench = json(&[&arguments[..], &["--step", step, "-a", "cpu"]].concat());
+        bench["actions"][0]["samples"].as_f64().unwrap()
+    };
+    let ratio = samples("0.25") / samples("1");
+    assert!((3.0..5.0).contains(&ratio), "{ratio}");
+    assert_eq!(volact(&["bench", "part/scene.ron", "-a", "null", "--step", "1"]).code, 2, "nobody takes a step");
+}
+
+#[test]
 fn bench_draws_bare_volumes() {
     let run = volact(&["bench", "part/part.nrrd", "-n", "1", "--warm-up", "0", "--size", "8x8"]);
     assert_eq!(run.code, 0, "{}", run.err);

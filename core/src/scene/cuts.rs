@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use super::{
-    OpaqueDepthSpec, OpaqueSpec,
+    OpaqueDepthSpec, OpaqueSpec, Problems,
     parameters::{head, matrix},
-    reader::{At, Reader},
+    reader::{self, At, Reader},
 };
 use crate::{Aabb, Clip, ClipRegion, Plane, SliceStyle, Slices, camera::DepthRange};
 
@@ -47,6 +47,22 @@ fn plane(reader: &mut Reader, at: &At) -> Option<Plane> {
             None
         }
     }
+}
+
+/// Reads one region as `clip` has it, e.g. `Cut(Box(min: (0, 0, 0), max: (1, 1, 1)))`.
+///
+/// # Errors
+/// All problems.
+pub fn parse_region(text: &str) -> Result<ClipRegion, Problems> {
+    reader::one(text, region)
+}
+
+/// Reads one plane as `slices` have it, e.g. `Plane(point: (0, 0, 1), normal: (0, 0, 1))`.
+///
+/// # Errors
+/// All problems.
+pub fn parse_plane(text: &str) -> Result<Plane, Problems> {
+    reader::one(text, plane)
 }
 
 /// A list of regions, all of which must keep a point.

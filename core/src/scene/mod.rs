@@ -53,6 +53,7 @@ use std::collections::BTreeMap;
 use crate::{Clip, Registry};
 
 pub use build::{Scene, SceneError};
+pub use cuts::{parse_plane, parse_region};
 pub use description::{
     ActionSpec, AttributeSpec, AttributeValues, CameraSpec, DataAttributeSpec, DataSpec, GeometrySpec, ImageSpec,
     MeshSpec, OpaqueDepthSpec, OpaqueSpec, ParameterSpec, PointsSpec, ShapeSpec, TableEntries, TableSpec,

@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, fmt::Display};
 use glam::DVec3;
 
 use super::{
-    document::{Kind, Node},
+    document::{self, Kind, Node},
     lexer::show_text,
     problem::{Problem, Problems, Spot},
 };
@@ -47,6 +47,16 @@ pub(crate) struct Reader {
     problems: Vec<Problem>,
     more: usize,
     places: BTreeMap<String, Spot>,
+}
+
+/// Reads a text that is one value.
+pub(crate) fn one<T>(text: &str, read: fn(&mut Reader, &At) -> Option<T>) -> Result<T, Problems> {
+    let root = document::parse(text).map_err(|problem| Problems::new(vec![problem]))?;
+    let mut reader = Reader::default();
+    let at = reader.root(&root);
+    let value = read(&mut reader, &at);
+    reader.done()?;
+    value.ok_or_else(|| Problems::new(vec![Problem::new(None, "", "nothing", "a value")]))
 }
 
 /// The path of a field inside a path.

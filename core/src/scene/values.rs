@@ -4,7 +4,7 @@ use std::{fs, io::Read, path::Path};
 
 use super::{
     AttributeSpec, AttributeValues, Folders, ParameterSpec, Problem, Problems, TableEntries, TableSpec, check,
-    document, parameters, reader::Reader,
+    parameters, reader,
 };
 use crate::{Attribute, Buffer, LookupTable, ParameterDecl, ParameterValue, ScalarType};
 
@@ -28,12 +28,7 @@ impl ParameterSpec {
     /// # Errors
     /// All problems.
     pub fn parse(text: &str) -> Result<Self, Problems> {
-        let root = document::parse(text).map_err(|problem| Problems::new(vec![problem]))?;
-        let mut reader = Reader::default();
-        let at = reader.root(&root);
-        let value = parameters::parameter(&mut reader, &at);
-        reader.done()?;
-        value.ok_or_else(|| Problems::new(vec![Problem::new(None, "", "nothing", "a value")]))
+        reader::one(text, parameters::parameter)
     }
 
     /// Makes the value. Where `declared` wants a colour, three or four numbers are one.

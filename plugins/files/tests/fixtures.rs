@@ -93,7 +93,8 @@ fn check(name: &str, mesh: &MeshData, wanted: &Value) {
 
 fn check_attributes(name: &str, mesh: &MeshData, wanted: &Value) {
     for (attribute, wanted) in wanted["attributes"].as_object().unwrap() {
-        if ["Normals", "vtkGhostType"].contains(&attribute.as_str()) || name.ends_with(".stl") || name.ends_with(".obj") {
+        if ["Normals", "vtkGhostType"].contains(&attribute.as_str()) || name.ends_with(".stl") || name.ends_with(".obj")
+        {
             continue;
         }
         let what = format!("{name}: {attribute}");

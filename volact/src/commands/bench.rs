@@ -2,7 +2,6 @@
 
 use std::{
     fmt::Write as _,
-    path::{Path, PathBuf},
     process::ExitCode,
     time::{Duration, Instant},
 };
@@ -10,17 +9,20 @@ use std::{
 use anyhow::Context as _;
 use serde_json::{Value, json};
 use volact::{
-    Frame, FrameDesc, Options, Registry, RenderAction, Shape, core::loader::NoProgress, core::scene::Scene, transfer,
+    Frame, Options, Registry, RenderAction,
+    core::{parameter::Kind, scene::Scene},
 };
+
+use super::source::{self, Opened};
 
 /// Arguments of `volact bench`.
 #[derive(clap::Args)]
 #[command(after_help = "Each action draws its first frame, then the warm-up frames, none of which count. The frames \
     that count are drawn in turns, one of each action, so that what disturbs the machine disturbs all alike. \
-    The spread is from the first to the third quartile.")]
+    The spread is from the first to the third quartile. Options that an action does not take are left out for it.")]
 pub struct Args {
-    /// A scene (.ron) or a bare volume
-    scene: PathBuf,
+    #[command(flatten)]
+    source: source::Args,
     /// An action to measure; again for further ones, which are related to the first
     #[arg(short, long = "action", value_name = "NAME")]
     actions: Vec<String>,
@@ -30,12 +32,17 @@ pub struct Args {
     /// Frames before those, of each action
     #[arg(long, default_value_t = 2)]
     warm_up: u32,
-    /// Size of the picture instead of the scene's own, e.g. 1024x768
-    #[arg(short, long, value_name = "WIDTHxHEIGHT", value_parser = parse_size)]
-    size: Option<[usize; 2]>,
     /// Print JSON
     #[arg(long)]
     json: bool,
+}
+
+/// What a table or a JSON says above its rows.
+struct Head {
+    scene: String,
+    size: [usize; 2],
+    frames: u32,
+    warm_up: u32,
 }
 
 /// Measures and prints.
@@ -43,68 +50,56 @@ pub struct Args {
 /// # Errors
 /// If the scene cannot be read, or an action cannot be made or draw it.
 pub fn run(args: Args, registry: &Registry) -> anyhow::Result<ExitCode> {
-    let mut subject = Subject::open(&args.scene, registry)?;
-    if let Some([width, height]) = args.size {
-        anyhow::ensure!(subject.frame.viewport.is_none(), "the scene sets a viewport; its size cannot be changed here");
-        (subject.frame.width, subject.frame.height) = (width, height);
-    }
+    let subject = args.source.open(registry)?;
+    let names = actions(&subject, &args.actions);
     let mut runs = Vec::new();
-    for name in subject.actions(&args.actions) {
-        runs.push(Run::start(&name, &subject, registry)?);
+    for name in &names {
+        let options = options(&subject, name, &names, registry)?;
+        runs.push(Run::start(name, &options, &subject.scene, registry)?);
     }
     for _ in 0..args.warm_up {
-        runs.iter_mut().try_for_each(|run| run.draw(&subject).map(drop))?;
+        runs.iter_mut().try_for_each(|run| run.draw(&subject.scene).map(drop))?;
     }
     for _ in 0..args.frames {
         for run in &mut runs {
-            let (time, frame) = run.draw(&subject)?;
+            let (time, frame) = run.draw(&subject.scene)?;
             run.times.push(time);
             run.last = frame;
         }
     }
     let rows: Vec<Row> = runs.iter().map(Run::row).collect();
-    let size = [subject.frame.width, subject.frame.height];
-    let text = if args.json { to_json(&rows, size, &args) } else { to_text(&rows, size, &args) };
-    super::print(&text)?;
+    let head = Head {
+        scene: args.source.input.display().to_string(),
+        size: [subject.scene.frame.width, subject.scene.frame.height],
+        frames: args.frames,
+        warm_up: args.warm_up,
+    };
+    super::print(&if args.json { to_json(&rows, &head) } else { to_text(&rows, &head) })?;
     Ok(ExitCode::SUCCESS)
 }
 
-fn parse_size(text: &str) -> Result<[usize; 2], String> {
-    let parts: Option<Vec<usize>> = text.split('x').map(|n| n.parse().ok().filter(|n| *n > 0)).collect();
-    parts.and_then(|p| p.try_into().ok()).ok_or_else(|| format!("{text:?}, wanted two numbers as in 1024x768"))
+/// The actions asked for, else the scene's own, else `cpu`.
+fn actions(subject: &Opened, asked: &[String]) -> Vec<String> {
+    match (&subject.scene.action, asked) {
+        (Some((name, _)), []) => vec![name.clone()],
+        (None, []) => vec!["cpu".into()],
+        _ => asked.to_vec(),
+    }
 }
 
-/// What is drawn.
-struct Subject {
-    shapes: Vec<Shape>,
-    frame: FrameDesc,
-    action: Option<(String, Options)>,
-}
-
-impl Subject {
-    fn open(path: &Path, registry: &Registry) -> anyhow::Result<Self> {
-        if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("ron")) {
-            let Scene { shapes, frame, action } = Scene::open(path, registry, &NoProgress)?;
-            return Ok(Self { shapes, frame, action });
-        }
-        let volume = registry.load(path)?;
-        let look = transfer::automatic(&volume);
-        Ok(Self { shapes: vec![look.shape(&volume)], frame: look.frame(512, 512), action: None })
-    }
-
-    /// The actions asked for, else the scene's own, else `cpu`.
-    fn actions(&self, asked: &[String]) -> Vec<String> {
-        match (&self.action, asked) {
-            (Some((name, _)), []) => vec![name.clone()],
-            (None, []) => vec!["cpu".into()],
-            _ => asked.to_vec(),
-        }
-    }
-
-    /// The scene's options, for the action that it names.
-    fn options(&self, name: &str) -> Options {
-        self.action.as_ref().filter(|(own, _)| own == name).map(|(_, o)| o.clone()).unwrap_or_default()
-    }
+/// The options of one of several actions: those that it takes. One that none of them takes is left
+/// in, so that making the action says so.
+fn options(subject: &Opened, name: &str, all: &[String], registry: &Registry) -> anyhow::Result<Options> {
+    let (_, given) = subject.action(Some(name));
+    let declarations = registry.declarations();
+    let takes = |action: &str, option: &str| {
+        let declared = declarations.iter().filter(|d| d.kind == Kind::Action && d.name == action);
+        action == "checked" || declared.into_iter().any(|d| d.parameter(option).is_some())
+    };
+    let known = |option: &str| all.iter().any(|action| takes(action, option));
+    let of_command = |option: &String| subject.options.contains_key(option);
+    let kept = given.into_iter().filter(|(o, _)| takes(name, o) || !of_command(o) || !known(o)).collect();
+    Ok(subject.config.options_of(name, &kept))
 }
 
 /// One action on its way.
@@ -117,8 +112,8 @@ struct Run {
 }
 
 impl Run {
-    fn start(name: &str, subject: &Subject, registry: &Registry) -> anyhow::Result<Self> {
-        let mut action = registry.action(name, &subject.options(name))?;
+    fn start(name: &str, options: &Options, subject: &Scene, registry: &Registry) -> anyhow::Result<Self> {
+        let mut action = registry.action(name, options)?;
         for shape in &subject.shapes {
             action.manage(shape)?;
         }
@@ -128,7 +123,7 @@ impl Run {
         Ok(run)
     }
 
-    fn draw(&mut self, subject: &Subject) -> anyhow::Result<(Duration, Frame)> {
+    fn draw(&mut self, subject: &Scene) -> anyhow::Result<(Duration, Frame)> {
         let start = Instant::now();
         self.action.begin_draw(&subject.frame)?;
         for shape in &subject.shapes {
@@ -187,9 +182,10 @@ impl Row {
     }
 }
 
-fn to_text(rows: &[Row], [width, height]: [usize; 2], args: &Args) -> String {
+fn to_text(rows: &[Row], head: &Head) -> String {
     let mut text = String::new();
-    _ = writeln!(text, "{}, {width} × {height}, {} frames", args.scene.display(), args.frames);
+    let [width, height] = head.size;
+    _ = writeln!(text, "{}, {width} × {height}, {} frames", head.scene, head.frames);
     _ = writeln!(
         text,
         "{:<12}{:>10}{:>10}{:>10}{:>10}{:>10}{:>12}{:>8}  times in ms",
@@ -209,7 +205,7 @@ fn to_text(rows: &[Row], [width, height]: [usize; 2], args: &Args) -> String {
     text
 }
 
-fn to_json(rows: &[Row], size: [usize; 2], args: &Args) -> String {
+fn to_json(rows: &[Row], head: &Head) -> String {
     let row = |row: &Row| {
         let [least, q1, median, q3, most] = row.quartiles;
         json!({
@@ -229,10 +225,10 @@ fn to_json(rows: &[Row], size: [usize; 2], args: &Args) -> String {
         })
     };
     let value = json!({
-        "scene": args.scene.display().to_string(),
-        "size": size,
-        "frames": args.frames,
-        "warm_up": args.warm_up,
+        "scene": head.scene,
+        "size": head.size,
+        "frames": head.frames,
+        "warm_up": head.warm_up,
         "actions": rows.iter().map(row).collect::<Vec<Value>>(),
     });
     format!("{value:#}\n")
@@ -241,6 +237,7 @@ fn to_json(rows: &[Row], size: [usize; 2], args: &Args) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use volact::{Camera, FrameDesc, config::Config, core::glam::DVec3};
 
     fn row(action: &str, median: f64) -> Row {
         let quartiles = [0.9, 0.95, 1.0, 1.1, 2.0].map(|f| f * median);
@@ -257,8 +254,8 @@ mod tests {
         }
     }
 
-    fn args() -> Args {
-        Args { scene: "a.ron".into(), actions: vec![], frames: 3, warm_up: 1, size: None, json: true }
+    fn head() -> Head {
+        Head { scene: "a.ron".into(), size: [8, 4], frames: 3, warm_up: 1 }
     }
 
     #[test]
@@ -269,37 +266,31 @@ mod tests {
 
     #[test]
     fn ratios_are_to_the_first() {
-        let text = to_json(&[row("cpu", 0.02), row("other", 0.05)], [8, 4], &args());
+        let text = to_json(&[row("cpu", 0.02), row("other", 0.05)], &head());
         let value: Value = serde_json::from_str(&text).unwrap();
         assert_eq!(value["actions"][1]["ratio"], json!(2.5));
         assert_eq!(value["actions"][0]["samples_per_s"], json!(2e8));
-        assert!(to_text(&[row("cpu", 0.02), row("other", 0.05)], [8, 4], &args()).contains("2.50  here"));
-    }
-
-    #[test]
-    fn sizes_are_two_numbers() {
-        assert_eq!(parse_size("640x480"), Ok([640, 480]));
-        assert!(["640", "0x4", "4x4x4", "ax2", ""].iter().all(|t| parse_size(t).is_err()));
+        assert!(to_text(&[row("cpu", 0.02), row("other", 0.05)], &head()).contains("2.50  here"));
     }
 
     #[test]
     fn the_scene_chooses_unless_told() {
-        let subject = |action| Subject {
-            shapes: vec![],
-            frame: FrameDesc::new(
-                volact::Camera::perspective(
-                    volact::core::glam::DVec3::ONE,
-                    volact::core::glam::DVec3::ZERO,
-                    volact::core::glam::DVec3::Z,
-                    30.0,
-                ),
-                4,
-                4,
-            ),
-            action,
+        let subject = |action| Opened {
+            scene: Scene {
+                shapes: vec![],
+                frame: FrameDesc::new(Camera::perspective(DVec3::ONE, DVec3::ZERO, DVec3::Z, 30.0), 4, 4),
+                action,
+            },
+            notes: vec![],
+            config: Config::default(),
+            options: Options::from([("threads".to_owned(), 2i64.into()), ("sample_distance".to_owned(), 0.5.into())]),
         };
-        assert_eq!(subject(None).actions(&[]), ["cpu"]);
-        assert_eq!(subject(Some(("reference".into(), Options::new()))).actions(&[]), ["reference"]);
-        assert_eq!(subject(None).actions(&["a".into(), "b".into()]), ["a", "b"]);
+        assert_eq!(actions(&subject(None), &[]), ["cpu"]);
+        assert_eq!(actions(&subject(Some(("reference".into(), Options::new()))), &[]), ["reference"]);
+        assert_eq!(actions(&subject(None), &["a".into(), "b".into()]), ["a", "b"]);
+        let registry = volact::with_builtins();
+        let both = ["cpu".to_owned(), "null".to_owned()];
+        let taken = |name: &str, all: &[String]| options(&subject(None), name, all, &registry).unwrap().len();
+        assert_eq!([taken("cpu", &both), taken("null", &both), taken("null", &both[1..])], [2, 0, 2]);
     }
 }

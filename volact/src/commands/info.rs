@@ -1,6 +1,7 @@
 //! `volact info`: what a file holds, and how its values are spread.
 
 mod chart;
+mod mesh;
 mod values;
 
 use std::{
@@ -14,11 +15,18 @@ use anyhow::Context as _;
 use serde_json::{Value, json};
 use volact::{
     Aabb, LoadError, LoadOptions, Loader, Registry, Volume, VolumeDesc, VolumeReader,
-    core::{glam::DVec3, loader, loader::NoProgress, volume::Components},
+    core::{
+        glam::DVec3,
+        loader::{self, Content, NoProgress},
+        volume::Components,
+    },
     transfer,
 };
 
-use super::settings::{self, Setting};
+use super::{
+    progress::Line,
+    settings::{self, Setting},
+};
 use chart::{Chart, Style};
 use values::{PERCENTILES, Values};
 
@@ -36,9 +44,12 @@ pub struct Args {
     /// Look at the header only: no values, no histogram
     #[arg(long)]
     header: bool,
-    /// The component whose values are shown
+    /// The component of a volume whose values are shown
     #[arg(long, default_value_t = 0, value_name = "NUMBER")]
     component: usize,
+    /// The attribute of a mesh whose values are shown: NAME, or NAME[2] for one of its components
+    #[arg(long, value_name = "NAME")]
+    attribute: Option<String>,
     /// Draw the histogram on a logarithmic scale
     #[arg(long)]
     log: bool,
@@ -56,6 +67,10 @@ pub struct Args {
 /// If the file cannot be read, or has no such component.
 pub fn run(args: Args, registry: &Registry) -> anyhow::Result<ExitCode> {
     let loader = choose(registry, &args)?;
+    if loader.content() == Content::Mesh {
+        return mesh_info(&args, loader.as_ref());
+    }
+    anyhow::ensure!(args.attribute.is_none(), "--attribute is for meshes; {} holds a volume", args.file.display());
     let mut reader = open(loader.as_ref(), &args.file, &settings::options(&args.load)?)?;
     let desc = reader.desc().clone();
     anyhow::ensure!(
@@ -77,6 +92,17 @@ pub fn run(args: Args, registry: &Registry) -> anyhow::Result<ExitCode> {
     } else {
         facts.to_text(values.as_ref(), &args)
     };
+    super::print(&text)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Reads a mesh and prints what it holds.
+fn mesh_info(args: &Args, loader: &dyn Loader) -> anyhow::Result<ExitCode> {
+    let line = Line::new(format!("reading {}", args.file.display()));
+    let data = loader::load_mesh(loader, &args.file, &settings::options(&args.load)?, &line)?;
+    drop(line);
+    let facts = mesh::Facts::new(&args.file, &loader.declaration().name, &data, args)?;
+    let text = if args.json { facts.to_json(args.bins.unwrap_or(64)) } else { facts.to_text(args) };
     super::print(&text)?;
     Ok(ExitCode::SUCCESS)
 }
@@ -161,11 +187,7 @@ impl Facts {
             _ = writeln!(text, "{name:<12}{value}");
         }
         if let Some((values, _)) = found {
-            let terminal = std::io::stdout().is_terminal();
-            let style = if terminal { Style::Blocks } else { Style::Plain };
-            let width = args.bins.unwrap_or_else(|| terminal_width(terminal)).clamp(8, 400);
-            let chart = Chart { counts: &values.histogram(width), range: values.range, log: args.log, style };
-            text.push_str(&chart.draw());
+            text.push_str(&draw_chart(values, args));
         }
         text
     }
@@ -203,6 +225,14 @@ impl Facts {
     }
 }
 
+/// The histogram as text, as wide as the user wants it.
+fn draw_chart(values: &Values, args: &Args) -> String {
+    let terminal = std::io::stdout().is_terminal();
+    let style = if terminal { Style::Blocks } else { Style::Plain };
+    let width = args.bins.unwrap_or_else(|| terminal_width(terminal)).clamp(8, 400);
+    Chart { counts: &values.histogram(width), range: values.range, log: args.log, style }.draw()
+}
+
 fn terminal_width(terminal: bool) -> usize {
     let columns = terminal.then(terminal_size::terminal_size).flatten().map(|(w, _)| usize::from(w.0));
     columns.unwrap_or(80)
@@ -232,6 +262,15 @@ fn size(bytes: usize) -> String {
     match bytes {
         0..10_000 => format!("{bytes}"),
         _ => format!("{bytes} ({:.1} MiB)", bytes as f64 / 1_048_576.0),
+    }
+}
+
+#[cfg(test)]
+impl Args {
+    fn for_tests() -> Self {
+        let (loader, load, attribute, bins) = (None, Vec::new(), None, None);
+        let file = PathBuf::new();
+        Self { file, loader, load, header: false, component: 0, attribute, log: false, bins, json: false }
     }
 }
 

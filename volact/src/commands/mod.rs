@@ -1,9 +1,11 @@
-//! The subcommands, one module each, and what they share: `source` (what to draw), `settings`,
-//! `progress`, `report`.
+//! The subcommands, one module each, and what they share: `source` (what to draw; `bare`, `cuts`),
+//! `settings`, `progress`, `report`.
 
+pub mod bare;
 pub mod bench;
 pub mod compare;
 pub mod completions;
+pub mod cuts;
 pub mod describe;
 pub mod info;
 pub mod progress;
@@ -23,7 +25,7 @@ use clap::Subcommand;
 /// What the user asks for.
 #[derive(Subcommand)]
 pub enum Command {
-    /// Draw a scene or a bare volume into a picture
+    /// Draw a scene, or a bare volume, mesh or surface, into a picture
     Render(render::Args),
     /// Say what a file holds
     Info(info::Args),
@@ -41,7 +43,9 @@ impl Command {
     /// Does it.
     pub fn run(self) -> anyhow::Result<ExitCode> {
         report::listen();
-        let registry = volact::with_builtins();
+        leave_nothing_half_done();
+        let mut registry = volact::with_builtins();
+        registry.set_progress(progress::watch());
         match self {
             Self::Render(args) => render::run(args, &registry),
             Self::Info(args) => info::run(args, &registry),
@@ -50,6 +54,18 @@ impl Command {
             Self::Bench(args) => bench::run(args, &registry),
             Self::Completions(args) => completions::run(args, &registry),
         }
+    }
+}
+
+/// Where the user or the system ends the command, no part of a picture stays behind.
+fn leave_nothing_half_done() {
+    let told = ctrlc::set_handler(|| {
+        volact_files::picture::discard_unfinished();
+        // As shells have it for a command that an interrupt ended.
+        std::process::exit(130);
+    });
+    if let Err(error) = told {
+        log::debug!("signals are not heard: {error}");
     }
 }
 

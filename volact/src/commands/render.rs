@@ -1,4 +1,4 @@
-//! `volact render`: draws a scene or a bare volume into a picture.
+//! `volact render`: draws a scene or bare data into a picture.
 
 use std::{
     path::{Path, PathBuf},
@@ -17,11 +17,16 @@ use super::{progress::Line, report::Report, source, source::Source};
     volact render head.nrrd                       a look that suits the data, into head.png\n  \
     volact render head.nrrd --shader mip --view front --size 800x600 -o mip.png\n  \
     volact render scene.ron --set unit_distance=2 --set 'skin.lookup_table=WindowLevel(window: 400, level: 40, opacity: 0.1)'\n  \
-    volact render scene.ron --action cpu --option classification=post --step 0.25 -o exact.exr\n\
+    volact render scene.ron --action cpu --option classification=post --step 0.25 -o exact.exr\n  \
+    volact render room.vtu --attribute t --slice z=50% --slice x=1.5 --around-slices\n  \
+    volact render part.stl --clip 'y>0'\n\
     Existing pictures are replaced; a picture appears whole or not at all. `volact describe` lists what names mean.")]
 pub struct Args {
     #[command(flatten)]
     source: source::Args,
+    /// The action that draws; the scene's, else the first preferred one that can
+    #[arg(short, long, value_name = "NAME")]
+    action: Option<String>,
     /// The picture: .png, .exr or .npy [default: the input's name with .png, in the current folder]
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -43,7 +48,7 @@ pub fn run(args: Args, registry: &Registry) -> anyhow::Result<ExitCode> {
         None => default_output(&args.source.input)?,
     };
     let png = args.png(&output)?;
-    let mut source = Source::open(&args.source, registry)?;
+    let mut source = Source::open(&args.source, args.action.as_deref(), registry)?;
     let line = Line::new(format!("drawing with {}", source.choice.name));
     let frame = source.draw()?;
     drop(line);
@@ -89,8 +94,10 @@ fn overwrites(input: &Path, output: &Path) -> bool {
 }
 
 /// Extensions of inputs, those of compressed files first.
-const ENDINGS: [&str; 13] =
-    [".gz", ".ron", ".nrrd", ".nhdr", ".nii", ".mha", ".mhd", ".tif", ".tiff", ".vti", ".vtk", ".raw", ".dcm"];
+const ENDINGS: [&str; 22] = [
+    ".gz", ".ron", ".nrrd", ".nhdr", ".nii", ".mha", ".mhd", ".tif", ".tiff", ".vti", ".vtk", ".vtu", ".vts", ".raw",
+    ".dcm", ".stl", ".ply", ".obj", ".xyz", ".p3d", ".q", ".bin",
+];
 
 /// The input's name without its extension, as `.png` in the current folder.
 fn default_output(input: &Path) -> anyhow::Result<PathBuf> {
@@ -115,6 +122,7 @@ mod tests {
         assert_eq!(name("brain.nii.gz"), "brain.png");
         assert_eq!(name("series/"), "series.png");
         assert_eq!(name("v1.2.raw"), "v1.2.png");
+        assert_eq!(name("meshes/room.vtu"), "room.png");
         assert!(default_output(Path::new("..")).is_err());
     }
 }

@@ -10,7 +10,7 @@ use std::{
 use serde_json::{Value, json};
 use volact::{
     Frame, ParameterValue, Shape, VolumeTexture,
-    core::{Severity, Warning, warning},
+    core::{Severity, Warning, select, warning},
 };
 
 use super::source::Source;
@@ -62,7 +62,9 @@ impl Report<'_> {
             _ = writeln!(text, "  look    {note}");
         }
         _ = writeln!(text, "  how     {}: {}", self.source.choice.name, self.method());
-        for (name, why) in &self.source.choice.refused {
+        // That a backend is not there at all is no news, unless the user wants all of them.
+        let told = |why: &str| why != select::NOT_REGISTERED || log::log_enabled!(log::Level::Info);
+        for (name, why) in self.source.choice.refused.iter().filter(|(_, why)| told(why)) {
             _ = writeln!(text, "  not by  {name}: {why}");
         }
         _ = writeln!(text, "  speed   {}", self.speed());
@@ -142,6 +144,15 @@ fn describe(shape: &Shape) -> String {
         let several = if desc.components > 1 { format!("{} × ", desc.components) } else { String::new() };
         _ = write!(text, ", {x} × {y} × {z} samples of {several}{}", desc.scalar);
     }
+    if let Some(vertices) = state.geometry.vertex_count() {
+        _ = write!(text, " of {} vertices", count(vertices as f64));
+    }
+    if let Some(ParameterValue::Attribute(attribute)) = state.parameters.get("scalars") {
+        _ = write!(text, ", attribute {:?} of {}", attribute.name, attribute.scalar);
+    }
+    if let Some(slices) = state.geometry.slices() {
+        _ = write!(text, ", {} slice planes", slices.planes.len());
+    }
     if let Some(unit) = state.parameters.get("unit_distance").and_then(ParameterValue::as_float) {
         _ = write!(text, ", unit distance {unit:.4}");
     }
@@ -154,7 +165,10 @@ fn shape_json(shape: &Shape) -> Value {
         let desc = t.volume().desc();
         json!({"name": desc.name, "dims": t.data_roi().dims(), "scalar": desc.scalar.name(), "components": desc.components})
     });
-    json!({"name": shape.name(), "shader": state.shader, "geometry": state.geometry.name(), "volume": volume})
+    json!({
+        "name": shape.name(), "shader": state.shader, "geometry": state.geometry.name(),
+        "vertices": state.geometry.vertex_count(), "volume": volume,
+    })
 }
 
 fn milliseconds(time: Duration) -> f64 {

@@ -1,19 +1,20 @@
-//! What to draw: a scene file, or a bare volume with a look of its own.
+//! What to draw: a scene file, or a bare volume or mesh with a look of its own (`bare`).
 
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, bail};
 use volact::{
-    Appearance, Frame, FrameDesc, LoadOptions, LookupTable, Options, ParameterDecl, Registry, Shape, View, Volume,
+    Aabb, Frame, FrameDesc, Options, Registry, Shape, View,
     config::Config,
     core::{
-        scene::{CameraSpec, Scene, SceneFile},
+        scene::{CameraSpec, Folders, Scene, SceneFile},
         select::{self, Choice},
     },
-    transfer,
 };
 
 use super::{
+    bare,
+    cuts::{Cut, Slice},
     progress::Line,
     settings::{self, Setting, Size},
 };
@@ -22,12 +23,9 @@ use super::{
 #[derive(clap::Args)]
 #[group(skip)]
 pub struct Args {
-    /// A scene (.ron), or a volume: a file, or a folder with a series
-    #[arg(value_name = "SCENE.ron | VOLUME")]
+    /// A scene (.ron), or bare data: a volume (a file, or a folder with a series), mesh or surface
+    #[arg(value_name = "SCENE.ron | DATA")]
     pub input: PathBuf,
-    /// The action that draws; the scene's, else the first preferred one that can
-    #[arg(short, long, value_name = "NAME")]
-    pub action: Option<String>,
     /// Columns and rows
     #[arg(short, long, value_name = "WxH|N")]
     pub size: Option<Size>,
@@ -46,10 +44,22 @@ pub struct Args {
     /// Set an option of the action
     #[arg(long = "option", value_name = "NAME=VALUE")]
     pub option: Vec<Setting>,
-    /// Draw a bare volume with this shader instead of the one that suits it
+    /// Keep only a part, in world space: x<0.5, z>40% (of what is drawn), or a region as in scenes
+    #[arg(long, value_name = "CUT")]
+    pub clip: Vec<Cut>,
+    /// Draw bare data on a plane in world space: x=0.5, z=40%, or Plane(…) as in scenes
+    #[arg(long, value_name = "PLANE")]
+    pub slice: Vec<Slice>,
+    /// Draw what lies around the slices, too
+    #[arg(long, requires = "slice")]
+    pub around_slices: bool,
+    /// Draw bare data with this shader instead of the one that suits it
     #[arg(long, value_name = "NAME")]
     pub shader: Option<String>,
-    /// Read a bare volume with this loader instead of the one that knows it
+    /// Show this attribute of a bare mesh: NAME, or NAME[2] for one of its components
+    #[arg(long, value_name = "NAME")]
+    pub attribute: Option<String>,
+    /// Read bare data with this loader instead of the one that knows it
     #[arg(long, value_name = "NAME")]
     pub loader: Option<String>,
     /// An option of that loader, e.g. those of raw files: dims=(64, 64, 64)
@@ -58,6 +68,9 @@ pub struct Args {
     /// Background: r,g,b[,opacity] or #rrggbb
     #[arg(long, value_name = "COLOR", value_parser = settings::background)]
     pub background: Option<[f32; 4]>,
+    /// The folder for paths in scenes that begin with $VOLACT_DATA; else that environment variable
+    #[arg(long, value_name = "FOLDER")]
+    pub data_dir: Option<PathBuf>,
     /// The config file; else VOLACT_CONFIG, else the user's volact/config.ron
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
@@ -75,22 +88,35 @@ pub struct Source {
     pub notes: Vec<String>,
 }
 
+/// A scene, with what the command line says about it.
+pub struct Opened {
+    /// What to draw, and how as far as the scene says.
+    pub scene: Scene,
+    /// What was chosen for the user, in words.
+    pub notes: Vec<String>,
+    /// The config in force.
+    pub config: Config,
+    /// Options for actions from the command line.
+    pub options: Options,
+}
+
+impl Opened {
+    /// The action asked for, else the scene's, with its options: the command line's above the
+    /// scene's, if they are for the same action.
+    pub fn action(&self, asked: Option<&str>) -> (Option<String>, Options) {
+        let of_scene = self.scene.action.as_ref().filter(|(name, _)| asked.is_none_or(|asked| asked == name));
+        let mut options = of_scene.map(|(_, options)| options.clone()).unwrap_or_default();
+        options.extend(self.options.clone());
+        (asked.map(str::to_owned).or_else(|| of_scene.map(|(name, _)| name.clone())), options)
+    }
+}
+
 impl Source {
     /// Reads everything and chooses an action.
-    pub fn open(args: &Args, registry: &Registry) -> anyhow::Result<Self> {
-        let config = settings::config(args.config.clone())?;
-        let given = args.options()?;
-        let (scene, notes) = match args.is_scene() {
-            true => (args.scene(registry, &config)?, Vec::new()),
-            false => args.volume(registry, &config)?,
-        };
-        let (name, mut options) = match (&args.action, scene.action) {
-            (Some(name), Some((of, options))) if *name == of => (Some(of), options),
-            (Some(name), _) => (Some(name.clone()), Options::new()),
-            (None, Some((name, options))) => (Some(name), options),
-            (None, None) => (None, Options::new()),
-        };
-        options.extend(given);
+    pub fn open(args: &Args, action: Option<&str>, registry: &Registry) -> anyhow::Result<Self> {
+        let opened = args.open(registry)?;
+        let (name, options) = opened.action(action);
+        let Opened { scene, notes, config, .. } = opened;
         let choice = select::select(registry, &config, name.as_deref(), &options, &scene.shapes)?;
         Ok(Self { shapes: scene.shapes, frame: scene.frame, choice, notes })
     }
@@ -105,6 +131,21 @@ impl Source {
 }
 
 impl Args {
+    /// Reads everything.
+    pub fn open(&self, registry: &Registry) -> anyhow::Result<Opened> {
+        let config = settings::config(self.config.clone())?;
+        let options = self.options()?;
+        let (mut scene, notes) = match self.is_scene() {
+            true => (self.scene(registry, &config)?, Vec::new()),
+            false => bare::open(self, registry, &config)?,
+        };
+        let bounds = bounds(&scene.shapes);
+        for cut in &self.clip {
+            scene.frame.clip = scene.frame.clip.with(cut.region(&bounds)?);
+        }
+        Ok(Opened { scene, notes, config, options })
+    }
+
     /// Whether the input is a scene: `.ron`, but not the `.raw.ron` that describes raw voxels.
     fn is_scene(&self) -> bool {
         let name = self.input.file_name().map(|name| name.to_string_lossy().to_lowercase()).unwrap_or_default();
@@ -123,8 +164,11 @@ impl Args {
     }
 
     fn scene(&self, registry: &Registry, config: &Config) -> anyhow::Result<Scene> {
-        if self.shader.is_some() || self.loader.is_some() || !self.load.is_empty() {
-            bail!("--shader, --loader and --load are for bare volumes; a scene says these things itself");
+        let bare = self.shader.is_some() || self.attribute.is_some() || !self.slice.is_empty();
+        if bare || self.loader.is_some() || !self.load.is_empty() {
+            bail!(
+                "--shader, --attribute, --slice, --loader and --load are for bare data; a scene says these things itself"
+            );
         }
         let cannot = || format!("{}: cannot be drawn", self.input.display());
         let mut file = SceneFile::open(&self.input, registry).with_context(cannot)?;
@@ -138,64 +182,22 @@ impl Args {
         let Size(size) = self.size.unwrap_or(Size(file.image.size.unwrap_or(config.size)));
         file.image.size = Some(size);
         file.image.background = self.background.or(file.image.background).or(Some(config.background));
-        let base = self.input.parent().unwrap_or(Path::new(""));
+        let data = self.data_folder();
+        let folders = Folders { base: self.input.parent().unwrap_or(Path::new("")), data: data.as_deref() };
         let line = Line::new("reading");
-        file.build(registry, base, &line)
+        file.build(registry, folders, &line)
             .map_err(|problems| problems.of_file(self.input.display().to_string()))
             .with_context(cannot)
     }
 
-    fn volume(&self, registry: &Registry, config: &Config) -> anyhow::Result<(Scene, Vec<String>)> {
-        let volume = self.load(registry)?;
-        let automatic = transfer::automatic(&volume);
-        let mut notes = automatic.notes.clone();
-        let texture = automatic.texture(&volume);
-        let appearance = match &self.shader {
-            Some(shader) if *shader != automatic.shader => self.other_look(shader, &volume, registry, &mut notes),
-            _ => automatic.appearance(),
-        };
-        let shape = Shape::around_texture(&texture, appearance);
-        self.change(&shape, registry)?;
-        let Size([width, height]) = self.size.unwrap_or(Size(config.size));
-        let frame = match self.view {
-            Some(view) => automatic.frame_from(view, width, height),
-            None => automatic.frame(width, height),
-        };
-        let frame = frame.with_background(self.background.unwrap_or(config.background));
-        Ok((Scene { shapes: vec![shape], frame, action: None }, notes))
+    /// The folder for paths that begin with `$VOLACT_DATA`.
+    fn data_folder(&self) -> Option<PathBuf> {
+        let given = self.data_dir.clone();
+        given.or_else(|| std::env::var_os("VOLACT_DATA").filter(|folder| !folder.is_empty()).map(PathBuf::from))
     }
+}
 
-    fn load(&self, registry: &Registry) -> anyhow::Result<Volume> {
-        let options: LoadOptions = settings::options(&self.load)?;
-        let line = Line::new(format!("reading {}", self.input.display()));
-        let cannot = || format!("{}: cannot be drawn", self.input.display());
-        registry.load_with(&self.input, self.loader.as_deref(), &options, &line).with_context(cannot)
-    }
-
-    /// A shader of the user's choice shows the data's own range in grey.
-    fn other_look(&self, shader: &str, volume: &Volume, registry: &Registry, notes: &mut Vec<String>) -> Appearance {
-        let known =
-            |name: &str| registry.shaders().get(shader).is_some_and(|s| s.declaration.parameter(name).is_some());
-        let range = volume.value_range().unwrap_or([0.0, 1.0]);
-        notes.clear();
-        let mut appearance = Appearance::new(shader);
-        if known("lookup_table") {
-            notes.push(format!("grey from {} to {}", range[0], range[1]));
-            appearance = appearance.with("lookup_table", LookupTable::grey(range));
-        }
-        appearance
-    }
-
-    /// Changes a bare volume's parameters as `--set` says.
-    fn change(&self, shape: &Shape, registry: &Registry) -> anyhow::Result<()> {
-        for setting in &self.set {
-            let (_, parameter) = settings::shape_of(&setting.name, &[shape.name().to_owned()])?;
-            let shader = shape.state().shader;
-            let declared: Option<&ParameterDecl> =
-                registry.shaders().get(&shader).and_then(|s| s.declaration.parameter(parameter));
-            let value = setting.value.to_value(declared, Path::new(""));
-            shape.set_parameter(parameter, value.with_context(|| format!("parameter {parameter:?}"))?);
-        }
-        Ok(())
-    }
+/// The world box around all shapes.
+pub fn bounds(shapes: &[Shape]) -> Aabb {
+    shapes.iter().fold(Aabb::EMPTY, |b, shape| b.union(&shape.state().world_bounds()))
 }

@@ -1,13 +1,13 @@
-//! The values of a volume's component: extremes, percentiles, histogram.
+//! The values of a volume's component or a mesh's attribute: extremes, percentiles, histogram.
 
 use volact::Volume;
 
 /// The percentiles that are shown.
 pub const PERCENTILES: [f64; 7] = [0.1, 1.0, 25.0, 50.0, 75.0, 99.0, 99.9];
 
-/// What all voxels together say; in data units.
+/// What all voxels or vertices together say; in data units.
 pub struct Values {
-    /// Each finite value once, rising, with the number of voxels that have it or, for wide types,
+    /// Each finite value once, rising, with how many there are of it or, for wide types,
     /// every value with one.
     counts: Vec<(f64, u64)>,
     /// Lowest and highest finite value; zeros if there is none.
@@ -16,7 +16,7 @@ pub struct Values {
     pub mean: f64,
     /// The values at [`PERCENTILES`].
     pub percentiles: [f64; 7],
-    /// Voxels that are infinite or no number.
+    /// Those that are infinite or no number.
     pub not_finite: u64,
 }
 
@@ -27,14 +27,24 @@ impl Values {
         let bytes = volume.data().bytes();
         let stored = (0..desc.samples().unwrap_or(0))
             .map(|sample| desc.scalar.read(bytes, sample * desc.components + component));
-        let (mut counts, not_finite) = match desc.scalar.limits() {
+        let (counts, not_finite) = match desc.scalar.limits() {
             Some([lo, hi]) if hi - lo < 65536.0 => (count_narrow(stored, lo, hi), 0),
             _ => count_wide(stored),
         };
-        counts.iter_mut().for_each(|(v, _)| *v = *v * desc.slope + desc.intercept);
+        let mut counts: Vec<_> = counts.into_iter().map(|(v, n)| (v * desc.slope + desc.intercept, n)).collect();
         if desc.slope < 0.0 {
             counts.reverse();
         }
+        Self::from_counts(counts, not_finite)
+    }
+
+    /// Looks at numbers of any kind.
+    pub fn of(numbers: impl Iterator<Item = f64>) -> Self {
+        let (counts, not_finite) = count_wide(numbers);
+        Self::from_counts(counts, not_finite)
+    }
+
+    fn from_counts(counts: Vec<(f64, u64)>, not_finite: u64) -> Self {
         let total: u64 = counts.iter().map(|(_, n)| n).sum();
         let sum: f64 = counts.iter().map(|(v, n)| v * *n as f64).sum();
         let ends = counts.first().zip(counts.last()).map_or([0.0; 2], |(a, b)| [a.0, b.0]);
@@ -63,7 +73,7 @@ impl Values {
             ("percentiles", format!("{} at {} %", list.join(", "), names.join(", "))),
         ];
         if self.not_finite > 0 {
-            rows.push(("not finite", format!("{} voxels", self.not_finite)));
+            rows.push(("not finite", format!("{} numbers", self.not_finite)));
         }
         rows
     }

@@ -1,0 +1,119 @@
+//! Bare data: a volume, mesh or surface without a scene, drawn with a look that suits it.
+
+use std::{path::Path, sync::Arc};
+
+use anyhow::{Context as _, bail, ensure};
+use volact::{
+    Appearance, Data, FrameDesc, LoadOptions, LookupTable, MeshData, ParameterDecl, Registry, Shape, SliceStyle,
+    Sliced, Slices, View, Volume, VolumeTexture, config::Config, core::scene::Scene, transfer,
+};
+
+use super::{
+    cuts,
+    progress::Line,
+    settings::{self, Size},
+    source::Args,
+};
+
+/// Reads the data and chooses how to show them; what was chosen, in words.
+pub fn open(args: &Args, registry: &Registry, config: &Config) -> anyhow::Result<(Scene, Vec<String>)> {
+    let Size([width, height]) = args.size.unwrap_or(Size(config.size));
+    let (shape, frame, notes) = match load(args, registry)? {
+        Data::Volume(volume) => {
+            ensure!(args.attribute.is_none(), "--attribute is for meshes; {} holds a volume", args.input.display());
+            let automatic = transfer::automatic(&volume);
+            let (shape, notes) = volume_shape(args, &volume, &automatic, registry);
+            (shape, framed(args.view, automatic.view, |view| automatic.frame_from(view, width, height)), notes)
+        }
+        Data::Mesh(data) => {
+            let automatic = transfer::automatic_mesh(&data, args.attribute.as_deref())
+                .with_context(|| format!("{}: cannot be drawn", args.input.display()))?;
+            let (shape, notes) = mesh_shape(args, &data, &automatic);
+            (shape, framed(args.view, automatic.view, |view| automatic.frame_from(view, width, height)), notes)
+        }
+    };
+    change(args, &shape, registry)?;
+    slice(args, &shape)?;
+    let frame = frame.with_background(args.background.unwrap_or(config.background));
+    Ok((Scene { shapes: vec![shape], frame, action: None }, notes))
+}
+
+fn framed(asked: Option<View>, suits: View, frame: impl Fn(View) -> FrameDesc) -> FrameDesc {
+    frame(asked.unwrap_or(suits))
+}
+
+fn load(args: &Args, registry: &Registry) -> anyhow::Result<Data> {
+    let options: LoadOptions = settings::options(&args.load)?;
+    let line = Line::new(format!("reading {}", args.input.display()));
+    let cannot = || format!("{}: cannot be drawn", args.input.display());
+    registry.load_any(&args.input, args.loader.as_deref(), &options, &line).with_context(cannot)
+}
+
+fn volume_shape(
+    args: &Args,
+    volume: &Volume,
+    automatic: &transfer::Automatic,
+    registry: &Registry,
+) -> (Shape, Vec<String>) {
+    let (appearance, notes) = match &args.shader {
+        Some(shader) if *shader != automatic.shader => grey_look(shader, volume, registry),
+        _ => (automatic.appearance(), automatic.notes.clone()),
+    };
+    let texture: VolumeTexture = automatic.texture(volume);
+    (Shape::around_texture(&texture, appearance), notes)
+}
+
+/// A shader of the user's choice shows a volume's own range in grey.
+fn grey_look(shader: &str, volume: &Volume, registry: &Registry) -> (Appearance, Vec<String>) {
+    let known = |name: &str| registry.shaders().get(shader).is_some_and(|s| s.declaration.parameter(name).is_some());
+    let range = volume.value_range().unwrap_or([0.0, 1.0]);
+    let appearance = Appearance::new(shader);
+    if !known("lookup_table") {
+        return (appearance, Vec::new());
+    }
+    (appearance.with("lookup_table", LookupTable::grey(range)), vec![format!("grey from {} to {}", range[0], range[1])])
+}
+
+/// A shader of the user's choice gets the same attribute and table.
+fn mesh_shape(args: &Args, data: &MeshData, automatic: &transfer::AutomaticMesh) -> (Shape, Vec<String>) {
+    let shape = automatic.shape(data);
+    if let Some(shader) = &args.shader {
+        shape.set_shader(shader);
+    }
+    let mut notes = automatic.notes.clone();
+    let others: Vec<_> = data.attributes.iter().map(|a| a.name.as_str()).collect();
+    if args.attribute.is_none() && others.len() > 1 {
+        notes.push(format!("--attribute NAME shows another of {}", others.join(", ")));
+    }
+    (shape, notes)
+}
+
+/// Changes the parameters as `--set` says.
+fn change(args: &Args, shape: &Shape, registry: &Registry) -> anyhow::Result<()> {
+    for setting in &args.set {
+        let (_, parameter) = settings::shape_of(&setting.name, &[shape.name().to_owned()])?;
+        let shader = shape.state().shader;
+        let declared: Option<&ParameterDecl> =
+            registry.shaders().get(&shader).and_then(|s| s.declaration.parameter(parameter));
+        let value = setting.value.to_value(declared, Path::new(""));
+        shape.set_parameter(parameter, value.with_context(|| format!("parameter {parameter:?}"))?);
+    }
+    Ok(())
+}
+
+/// Draws the shape on planes as `--slice` says.
+fn slice(args: &Args, shape: &Shape) -> anyhow::Result<()> {
+    if args.slice.is_empty() {
+        return Ok(());
+    }
+    let state = shape.state();
+    if state.geometry.as_surface().is_some() {
+        bail!("--slice is for volumes and meshes; {} holds a surface", args.input.display());
+    }
+    let (bounds, to_object) = (state.world_bounds(), state.transform.inverse());
+    let planes: Result<Vec<_>, _> =
+        args.slice.iter().map(|slice| cuts::to_object(slice.plane(&bounds)?, &to_object)).collect();
+    let slices = Slices { planes: planes?, style: SliceStyle::Opaque, volume: args.around_slices };
+    shape.set_geometry(Sliced::new(Arc::clone(&state.geometry), slices)?);
+    Ok(())
+}
