@@ -128,9 +128,8 @@ impl Bent {
     ) -> i64 {
         let Some([_, last]) = cuts.whole() else { return i64::MAX };
         let start = first as f64 * job.lattice.step;
-        let mut from: [usize; LANES] = std::array::from_fn(|l| {
-            self.links[l].partition_point(|link| link.t[0] <= start).saturating_sub(1)
-        });
+        let mut from: [usize; LANES] =
+            std::array::from_fn(|l| self.links[l].partition_point(|link| link.t[0] <= start).saturating_sub(1));
         for row in 0..CHUNK {
             let k = first + row as i64;
             let inside = |l: usize| cuts.from[l] <= k as f64 && (k as f64) < cuts.to[l];
@@ -147,11 +146,7 @@ impl Bent {
 }
 
 /// Positions of lanes relative to a base near the first of them.
-pub fn local(
-    voxels: &Voxels<'_>,
-    live: u32,
-    mut at: impl FnMut(usize) -> DVec3,
-) -> (Base, [[f32; LANES]; 3]) {
+pub fn local(voxels: &Voxels<'_>, live: u32, mut at: impl FnMut(usize) -> DVec3) -> (Base, [[f32; LANES]; 3]) {
     let mut places = [DVec3::ZERO; LANES];
     (0..LANES).filter(|l| live >> l & 1 == 1).for_each(|l| places[l] = at(l));
     let base = Base::new(voxels, places[(live.trailing_zeros() as usize).min(LANES - 1)].to_array());

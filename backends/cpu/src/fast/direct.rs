@@ -303,7 +303,8 @@ mod tests {
     #[test]
     fn points_found_by_bins_are_those_found_by_search() {
         let point = |value: f64, opacity: f64| ControlPoint { value, color: [opacity, 0.5, 1.0 - opacity], opacity };
-        let mut points: Vec<_> = (0..40).map(|i| point((f64::from(i) * 0.37).sin() * 50.0, f64::from(i % 7) / 7.0)).collect();
+        let mut points: Vec<_> =
+            (0..40).map(|i| point((f64::from(i) * 0.37).sin() * 50.0, f64::from(i % 7) / 7.0)).collect();
         points.extend([point(3.0, 0.1), point(3.0, 0.9), point(50.5, 0.2), point(50.5, 0.8)]);
         let table = LookupTable::from_points(points).unwrap().resolve([0.0, 1.0]);
         let found = Found::new(&table);

@@ -2,7 +2,8 @@
 //!
 //! Where no ray meets two at the same place, and nothing without thickness lies inside one, each
 //! gets passes of its kernel from front to back, which go on from what the ones before left;
-//! otherwise they are put together by a [`sweep`](super::sweep).
+//! otherwise they are put together by a [`sweep`](super::sweep). The cells of a mesh that is the only
+//! shape have no lattice: they are passed up to each such thing, and then from there on.
 
 use volact_core::lattice::Lattice;
 
@@ -65,6 +66,13 @@ impl Over<'_> {
         let ended = ends.as_ref().map_or(0, |e| e.met);
         let met = aimed.iter().fold(ended, |met, (_, a)| met | a.stretches.active());
         let hits = ends.map(|e| e.hits).filter(|_| ended != 0);
+        if let [(part, only)] = aimed.as_slice()
+            && let Content::Field(field) = &part.content
+            && field.seen.is_some()
+        {
+            let hits = self.hits(bundle, &aimed, hits);
+            return ended | self.cells(bundle, part, only, &hits, pixels, counts);
+        }
         let sliced = aimed.iter().any(|(part, _)| part.is_sliced());
         if let ([(part, only)], None, false) = (aimed.as_slice(), &hits, sliced)
             && let Content::Voxels(job) = &part.content
@@ -76,7 +84,7 @@ impl Over<'_> {
         let hits = self.hits(bundle, &aimed, hits);
         aimed.retain(|(part, _)| part.volume);
         match self.stretches(&aimed, &hits) {
-            Some(stretches) => self.in_order(&aimed, &stretches, &hits, pixels, counts),
+            Some(stretches) => self.in_order(bundle, &aimed, &stretches, &hits, pixels, counts),
             None => self.together(bundle, &aimed, &hits, pixels, counts),
         }
         met
@@ -87,6 +95,61 @@ impl Over<'_> {
         for span in aimed.stretches.spans() {
             dispatch::draw(job, &aimed.packet.within(span), pixels, counts);
         }
+    }
+
+    /// Draws the cells of a mesh, and hits among them; returns the rays that met either.
+    fn cells(
+        &self,
+        bundle: &Bundle,
+        part: &Part<'_>,
+        aimed: &Aimed,
+        hits: &[Vec<Hit>; LANES],
+        pixels: &mut Pixels,
+        counts: &mut Counts,
+    ) -> u32 {
+        let (mut from, mut next, mut met) = ([f64::NEG_INFINITY; LANES], [0; LANES], 0);
+        loop {
+            let mut to = [f64::INFINITY; LANES];
+            for (l, to) in to.iter_mut().enumerate() {
+                *to = hits[l].get(next[l]).map_or(f64::INFINITY, |h| h.t);
+            }
+            if part.volume {
+                let spans = aimed.stretches.spans().iter().map(|s| s.between(&from, &to));
+                let spans: Vec<Span> = spans.filter(|s| s.active != 0).collect();
+                met |= self.walk(bundle, part, &spans, pixels, counts);
+            }
+            if to.iter().all(|t| t.is_infinite()) {
+                return met;
+            }
+            for l in (0..LANES).filter(|&l| to[l].is_finite()) {
+                self.meet(l, &hits[l], &mut next[l], to[l], pixels);
+                met |= 1 << l;
+            }
+            from = to;
+        }
+    }
+
+    /// Draws the cells of a mesh on some stretches; returns the rays that met them.
+    fn walk(&self, bundle: &Bundle, part: &Part<'_>, spans: &[Span], pixels: &mut Pixels, counts: &mut Counts) -> u32 {
+        let Content::Field(field) = &part.content else { return 0 };
+        let (Some(seen), false) = (&field.seen, spans.is_empty()) else { return 0 };
+        let drawn = seen.shot.draw(self.unit, bundle.pixel, spans, &seen.job, pixels);
+        counts.samples += drawn.crossings;
+        counts.lattice += drawn.crossings;
+        if drawn.left == 0 {
+            return drawn.met;
+        }
+        // Cells overlap there, or the eye is on a face.
+        let rays = bundle.through(&part.region.place.to_object);
+        let mut pieces: [Vec<Piece>; LANES] = Default::default();
+        let mut cuts = Vec::new();
+        for (l, pieces) in pieces.iter_mut().enumerate().filter(|(l, _)| drawn.left >> l & 1 == 1) {
+            for span in spans.iter().filter(|s| s.active >> l & 1 == 1) {
+                field.pieces(lane(&rays, l), [span.start[l], span.end[l]], &mut cuts, pieces);
+            }
+        }
+        self.sweep(Vec::new(), &mut pieces, &Default::default(), drawn.left, pixels, counts);
+        drawn.met | drawn.left
     }
 
     /// All hits by lane, in order.
@@ -107,9 +170,11 @@ impl Over<'_> {
     /// The stretches of each lane in order; `None` where some overlap, hold a hit, or have no kernel
     /// of their own.
     fn stretches(&self, aimed: &Met<'_, '_>, hits: &[Vec<Hit>; LANES]) -> Option<[Vec<Stretch>; LANES]> {
-        let straight =
-            |(part, aimed): &(&Part<'_>, Aimed)| matches!(part.content, Content::Voxels(_)) && aimed.bent.is_none();
-        if !aimed.iter().all(straight) {
+        let alone = |(part, aimed): &(&Part<'_>, Aimed)| match &part.content {
+            Content::Voxels(_) => aimed.bent.is_none(),
+            Content::Field(field) => field.seen.is_some(),
+        };
+        if !aimed.iter().all(alone) {
             return None;
         }
         let mut all: [Vec<Stretch>; LANES] = Default::default();
@@ -133,6 +198,7 @@ impl Over<'_> {
     /// same part.
     fn in_order(
         &self,
+        bundle: &Bundle,
         aimed: &Met<'_, '_>,
         stretches: &[Vec<Stretch>; LANES],
         hits: &[Vec<Hit>; LANES],
@@ -149,8 +215,10 @@ impl Over<'_> {
             let Some((part, number)) = (0..LANES).find_map(head) else { return };
             let mut span = aimed[part].1.stretches.spans()[number];
             span.active = (0..LANES).fold(0, |lanes, l| lanes | u32::from(head(l) == Some((part, number))) << l);
-            if let (Part { content: Content::Voxels(job), .. }, Aimed { packet, .. }) = &aimed[part] {
-                dispatch::draw(job, &packet.within(&span), pixels, counts);
+            let (drawn, Aimed { packet, .. }) = &aimed[part];
+            match &drawn.content {
+                Content::Voxels(job) => dispatch::draw(job, &packet.within(&span), pixels, counts),
+                Content::Field(_) => drop(self.walk(bundle, drawn, &[span], pixels, counts)),
             }
             (0..LANES).for_each(|l| next[l] += (span.active >> l & 1) as usize);
         }
@@ -204,10 +272,22 @@ impl Over<'_> {
                 }
             }
         }
+        self.sweep(layers, &mut pieces, hits, active, pixels, counts);
+    }
+
+    fn sweep(
+        &self,
+        layers: Vec<Layer<'_>>,
+        pieces: &mut [Vec<Piece>; LANES],
+        hits: &[Vec<Hit>; LANES],
+        active: u32,
+        pixels: &mut Pixels,
+        counts: &mut Counts,
+    ) {
         pieces.iter_mut().for_each(|p| p.sort_by(|a, b| a.t[0].total_cmp(&b.t[0])));
         let scene = Scene {
             layers,
-            pieces: &pieces,
+            pieces,
             hits,
             active,
             step: self.lattice.step,

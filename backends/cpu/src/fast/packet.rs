@@ -65,6 +65,16 @@ impl Span {
         }
     }
 
+    /// The part between two `t` a lane.
+    #[inline(always)]
+    pub fn between(mut self, from: &Lanes, to: &Lanes) -> Self {
+        for (start, &from) in self.start.iter_mut().zip(from) {
+            *start = if from > *start { from } else { *start };
+        }
+        self.limit(to);
+        self
+    }
+
     /// Lets go of lanes whose interval has no length or no end.
     #[inline(always)]
     pub fn settle(&mut self) {

@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 
 use volact_core::{
-    Aabb, Attribute, Clip, LookupTable, Plane, SliceStyle, glam::DVec3, lattice::Lattice,
+    Aabb, Attribute, Clip, LookupTable, Plane, SliceStyle, camera::LinearRays, glam::DVec3, lattice::Lattice,
     resolve::ResolvedShape, table::ResolvedTable,
 };
 
@@ -12,7 +12,7 @@ use super::{
     carve::Carver,
     dispatch,
     medium::Medium,
-    mesh::{build::Linked, trace::Crossing},
+    mesh::{build::Linked, integrate, numbers::Numbers, shot::Shot, trace::Crossing},
     options::Settings,
     over,
     packet::{Bundle, Packet, Place, Span, Vectors},
@@ -143,6 +143,17 @@ pub struct Field<'a> {
     color: Classified<'a>,
     opacity: Option<Classified<'a>>,
     unit: f64,
+    /// For the vector kernels, where they can draw it.
+    pub seen: Option<Seen<'a>>,
+}
+
+/// A field from a picture's camera.
+#[derive(Debug)]
+pub struct Seen<'a> {
+    /// Its cells.
+    pub shot: Shot<'a>,
+    /// What they add.
+    pub job: integrate::Job<'a>,
 }
 
 /// One number a vertex, and a table for it.
@@ -175,7 +186,17 @@ impl<'a> Field<'a> {
             Classified::new(attribute, component, other_table.unwrap_or(table))
         });
         let color = Classified::new(scalars, component, table);
-        Some(Self { mesh, color, opacity, unit: shape.float("unit_distance")? })
+        Some(Self { mesh, color, opacity, unit: shape.float("unit_distance")?, seen: None })
+    }
+
+    /// Makes the field ready for the vector kernels.
+    fn see(&mut self, shape: &ResolvedShape, numbers: &'a Numbers, eyes: &Eyes<'_>) {
+        let (settings, bounds) = (eyes.settings, shape.state.geometry.bounds());
+        let rays = (eyes.rays, eyes.size);
+        let shot = Shot::new(self.mesh, &numbers.numbers, &shape.state.transform, &bounds, rays, settings.threads);
+        let termination = settings.termination as f32;
+        let job = integrate::Job { table: &numbers.table, termination, threshold: eyes.threshold };
+        self.seen = shot.map(|shot| Seen { shot, job });
     }
 
     /// Adds the pieces of a ray, given in object space, on one stretch.
@@ -222,7 +243,20 @@ pub enum Content<'a> {
     /// Voxels on the lattice.
     Voxels(Box<over::Job<'a>>),
     /// Numbers at a mesh's vertices.
-    Field(Field<'a>),
+    Field(Box<Field<'a>>),
+}
+
+/// How a picture is looked at.
+#[derive(Clone, Copy, Debug)]
+pub struct Eyes<'a> {
+    /// The rays of its viewport.
+    pub rays: &'a LinearRays,
+    /// The viewport's size.
+    pub size: [usize; 2],
+    /// The action's settings.
+    pub settings: &'a Settings,
+    /// The opacity at which depth is taken.
+    pub threshold: f32,
 }
 
 /// Planes on which a shape is cut.
@@ -253,24 +287,32 @@ impl<'a> Part<'a> {
         shape: &'a ResolvedShape,
         scene: &'a Clip,
         resources: &'a Resources,
-        (lattice, settings, threshold): (Lattice, &Settings, f32),
+        lattice: Lattice,
+        eyes: &Eyes<'_>,
     ) -> Option<Self> {
-        let region = Region::new(shape, scene, resources)?;
+        let mut region = Region::new(shape, scene, resources)?;
         let (content, medium) = match shape.volume("volume") {
             Some(texture) => {
                 let tables = resources.tables(shape.id)?;
                 let job = over::Job {
-                    unit: settings.unit,
+                    unit: eyes.settings.unit,
                     voxels: voxels(shape, texture).0,
                     lattice,
                     classes: tables.classes(),
                     empty: tables.empty.as_ref(),
-                    termination: settings.termination as f32,
-                    threshold,
+                    termination: eyes.settings.termination as f32,
+                    threshold: eyes.threshold,
                 };
                 (Content::Voxels(Box::new(job)), Some(Medium::new(shape, texture)))
             }
-            None => (Content::Field(Field::new(shape, region.mesh?)?), None),
+            None => {
+                // Only its cells know where a field is.
+                let mut field = Field::new(shape, region.mesh.take()?)?;
+                if let Some(numbers) = resources.numbers(shape.id) {
+                    field.see(shape, numbers, eyes);
+                }
+                (Content::Field(Box::new(field)), None)
+            }
         };
         let slices = shape.state.geometry.slices();
         let slicing = slices.map(|s| Slicing { planes: &s.planes, style: s.style, medium });

@@ -16,7 +16,7 @@ use super::{
     order::Over,
     over::{Pixels, under},
     packet::{Bundle, SIDE},
-    part::Part,
+    part::{Eyes, Part},
     plan::Plan,
     resources::Resources,
     simd::LANES,
@@ -50,7 +50,9 @@ impl<'a> Picture<'a> {
         let (desc, viewport) = (&open.desc, open.desc.viewport());
         let grid = desc.camera.rays(&viewport).map_err(FrameError::from)?;
         let (lattice, threshold) = (Lattice { step: plan.step }, desc.depth_threshold);
-        let part = |shape| Part::new(shape, &desc.clip, resources, (lattice, settings, threshold));
+        let rays = grid.linear();
+        let eyes = Eyes { rays: &rays, size: [viewport.width, viewport.height], settings, threshold };
+        let part = |shape| Part::new(shape, &desc.clip, resources, lattice, &eyes);
         let flat = |shape| Flat::new(shape, &desc.clip, resources, settings, lattice);
         let of = |compositing: &'static dyn Fn(Compositing) -> bool| {
             drawn.iter().copied().filter(move |s| compositing(s.compositing()))
@@ -59,7 +61,7 @@ impl<'a> Picture<'a> {
         parts.sort_by_key(|part| part.id);
         let termination = settings.termination as f32;
         Ok(Self {
-            rays: grid.linear(),
+            rays,
             viewport,
             settings: *settings,
             limits: Limits::new(drawn, desc, resources, (&grid, viewport)),

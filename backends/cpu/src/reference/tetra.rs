@@ -182,12 +182,8 @@ mod tests {
     fn sheared(origin: DVec3, direction: DVec3) -> Sheared {
         let exact = |v: DVec3| v.to_array().map(Dd::new);
         let sizes = |v: DVec3| v.abs().to_array();
-        let path = Path {
-            at: exact(origin),
-            step: exact(direction),
-            at_size: sizes(origin),
-            step_size: sizes(direction),
-        };
+        let path =
+            Path { at: exact(origin), step: exact(direction), at_size: sizes(origin), step_size: sizes(direction) };
         Sheared::new(&path, 16.0)
     }
 

@@ -193,9 +193,9 @@ mod tests {
         assert_eq!(linked.boundary.len(), adjacency.boundary_faces);
         for (t, corners) in mesh.tetrahedra.iter().enumerate() {
             assert_eq!(linked.tetrahedron(t), *corners);
-            for entering in 0..4 {
+            for (entering, face) in FACES.iter().enumerate() {
                 let door = linked.doors[4 * t + entering];
-                for (slot, &leaving) in FACES[entering].iter().enumerate() {
+                for (slot, &leaving) in face.iter().enumerate() {
                     let next = door.next[slot];
                     let neighbour = adjacency.neighbours[t][leaving];
                     assert_eq!(next == OUTSIDE, neighbour == u32::MAX);

@@ -309,7 +309,8 @@ mod tests {
         for c in &all {
             let mut own = c.vertices;
             let mut wanted = tessellation.tetrahedra[c.tetrahedron];
-            (own.sort(), wanted.sort());
+            own.sort();
+            wanted.sort();
             assert_eq!(own, wanted);
             for (t, w) in c.span.into_iter().zip(c.weights) {
                 let point: DVec3 = (0..4).map(|i| w[i] * mesh.vertices.at(c.vertices[i] as usize)).sum();

@@ -23,6 +23,7 @@ use super::{
     bounds::{Emptiness, Peaks, ValueBounds},
     classify::Units,
     fetch::Voxels,
+    mesh::numbers::Numbers,
     options::{Classification, Settings},
     plan::Plan,
 };
@@ -54,6 +55,8 @@ pub struct Resources {
     peaks: BTreeMap<(BoundsKey, bool), Peaks>,
     /// By geometry.
     geometries: BTreeMap<usize, Kept>,
+    /// By shape.
+    numbers: BTreeMap<u64, Numbers>,
 }
 
 /// A geometry made ready. While it is kept, no other has its address.
@@ -148,7 +151,10 @@ impl Resources {
                 rebuilt.push(Rebuild { shape: shape.name.clone(), what: what.into(), bytes });
             };
             let bent = self.prepare_geometry(shape, progress, &mut say)?;
-            let Some(texture) = shape.volume("volume") else { continue };
+            let Some(texture) = shape.volume("volume") else {
+                self.prepare_numbers(shape, &mut say);
+                continue;
+            };
             let settings = if bent || plan.mixes(shape.id) { &post } else { settings };
             self.prepare_volume(shape, texture, plan.step, settings, &mut say);
         }
@@ -170,6 +176,7 @@ impl Resources {
         self.tables.retain(|id, _| ids.contains(id));
         self.zeros.retain(|key, _| keys.contains(key));
         self.geometries.retain(|address, _| geometries.contains(address));
+        self.numbers.retain(|id, _| ids.contains(id));
     }
 
     /// Bytes held.
@@ -182,11 +189,17 @@ impl Resources {
             + self.zeros.values().map(Emptiness::bytes).sum::<usize>()
             + self.peaks.values().map(Peaks::bytes).sum::<usize>()
             + self.geometries.values().map(|kept| kept.prepared.bytes()).sum::<usize>()
+            + self.numbers.values().map(Numbers::bytes).sum::<usize>()
     }
 
     /// Tables of a shape.
     pub fn tables(&self, id: u64) -> Option<&Tables> {
         self.tables.get(&id).map(Arc::as_ref)
+    }
+
+    /// The numbers of a shape's vertices, where they have one table for colour and opacity.
+    pub fn numbers(&self, id: u64) -> Option<&Numbers> {
+        self.numbers.get(&id)
     }
 
     /// The geometry of a shape as it was made ready; `None` where it is a box.
@@ -237,6 +250,16 @@ impl Resources {
         let Prepared::Solid(solid) = &kept.prepared else { return Ok(false) };
         solids::check_attributes(shape, solid)?;
         Ok(solid.texture.is_some())
+    }
+
+    fn prepare_numbers(&mut self, shape: &ResolvedShape, say: &mut impl FnMut(&str, usize)) {
+        let (last, mut anew) = (self.numbers.remove(&shape.id), false);
+        if let Some(numbers) = Numbers::new(shape, last, &mut anew) {
+            if anew {
+                say("classification", numbers.bytes());
+            }
+            self.numbers.insert(shape.id, numbers);
+        }
     }
 
     fn prepare_volume(
