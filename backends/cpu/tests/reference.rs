@@ -20,6 +20,12 @@ mod invariance;
 mod lattice;
 #[path = "reference/life.rs"]
 mod life;
+#[path = "reference/mesh.rs"]
+mod mesh;
+#[path = "reference/mesh_common.rs"]
+mod mesh_common;
+#[path = "reference/mesh_volume.rs"]
+mod mesh_volume;
 #[path = "reference/opaque.rs"]
 mod opaque;
 #[path = "reference/slices.rs"]

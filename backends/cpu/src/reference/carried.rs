@@ -6,9 +6,10 @@
 //! the volume, the crossing is cut.
 //!
 //! # What is wrong with a crossing's numbers
-//! Barycentric weights are wrong by next to nothing ([`tetra`](super::tetra)); interpolation by
-//! a few roundings; and where t₀ and t₁ are rounded, the field moves by its change over the
-//! crossing times that over t₁ − t₀. It never leaves the range of its corners.
+//! Barycentric weights are wrong by next to nothing ([`tetra`](super::tetra)) and interpolation by
+//! a few roundings, however short the crossing is. Its ends are known in double-double; where
+//! they are rounded, the field keeps its place on the crossing and the *length* is wrong, which
+//! harms the optical depth by no more than the same part.
 
 use volact_core::{Attribute, VolumeTexture, glam::DVec3};
 
@@ -16,9 +17,9 @@ use super::{
     cells::Grid,
     dd::Dd,
     line::{EPS, Line},
-    mark::{Mark, Stretches},
+    mark::{FINE, Mark, Stretches},
     medium::{Medium, Source, tame_infinities},
-    mesh::{Crossing, Mesh, Step, Trace, restrict},
+    mesh::{Crossing, Mesh, Step, Trace, distance, restrict},
     piece::{Kind, Linear, Piece, Stretch},
     sight::Sight,
 };
@@ -57,7 +58,7 @@ pub(super) struct Cells {
 pub(super) struct Way {
     /// Parts that do not overlap, in order; several where cells overlap.
     pub tracks: Vec<Vec<Part>>,
-    /// The stretches inside the mesh.
+    /// The stretches inside the mesh and, if there is one, the volume.
     pub stretches: Vec<[f64; 2]>,
     /// The length of what is so short that rounding decides what it shows.
     pub grazed: f64,
@@ -119,7 +120,7 @@ impl Carried {
             }),
             Self::Volume(volume) => (0..3).all(|a| {
                 let [from, to] = [from, to].map(|c| volume.along(c, a));
-                near(from.ends[1], to.ends[0], from.size.max(to.size))
+                near(from.ends[1].hi, to.ends[0].hi, from.size.max(to.size))
             }),
         }
     }
@@ -134,7 +135,7 @@ impl Carried {
             }),
             Self::Volume(volume) => (0..3).any(|a| {
                 let along = volume.along(crossing, a);
-                (along.ends[0] - along.ends[1]).abs() > 1e-9
+                (along.ends[0].hi - along.ends[1].hi).abs() > 1e-9
             }),
         }
     }
@@ -179,9 +180,13 @@ impl Cells {
             way.tracks.push(parts);
         }
         way.tracks.retain(|parts| !parts.is_empty());
+        if let Carried::Volume(_) = self.carried {
+            way.stretches = joined(way.tracks.iter().flatten().map(|p| p.t), gap * trace.reach);
+        }
         way
     }
 
+    /// A step with what is carried there; `None` where that is nothing.
     fn part(&self, medium: &Medium, trace: &Trace, step: &Step) -> Option<Part> {
         let crossing = &trace.crossings[step.crossing];
         let made = Part {
@@ -196,7 +201,7 @@ impl Cells {
             Carried::Numbers(fields) => {
                 let mut linear = [Linear { values: [0.0; 2], range: [0.0; 2], error: 0.0 }; 4];
                 for (linear, list) in linear.iter_mut().zip(fields).take(medium.fields.len()) {
-                    *linear = numbers(trace, crossing, step, corners(list, crossing))?;
+                    *linear = numbers(crossing, step, corners(list, crossing))?;
                 }
                 Some(Part { what: What::Numbers(linear), ..made })
             }
@@ -209,13 +214,27 @@ impl Cells {
         let crossing = &trace.crossings[step.crossing];
         match &self.carried {
             Carried::Numbers(_) => false,
-            Carried::Volume(volume) => !volume.line(trace, crossing, step.ends, step.t).is_sharp(),
+            Carried::Volume(volume) => !volume.line(crossing, step.ends, trace.dt).is_sharp(),
         }
     }
 }
 
+/// Stretches made one where they are no further apart than `gap`.
+fn joined(stretches: impl Iterator<Item = [f64; 2]>, gap: f64) -> Vec<[f64; 2]> {
+    let mut all: Vec<_> = stretches.collect();
+    all.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let mut made: Vec<[f64; 2]> = Vec::new();
+    for [start, end] in all {
+        match made.last_mut() {
+            Some(last) if start <= last[1] + gap => last[1] = last[1].max(end),
+            _ => made.push([start, end]),
+        }
+    }
+    made
+}
+
 /// A field along a step, from its numbers at the corners; `None` where one is NaN.
-fn numbers(trace: &Trace, crossing: &Crossing, step: &Step, mut corners: [f64; 4]) -> Option<Linear> {
+fn numbers(crossing: &Crossing, step: &Step, mut corners: [f64; 4]) -> Option<Linear> {
     if corners.iter().any(|v| v.is_nan()) {
         return None;
     }
@@ -225,22 +244,22 @@ fn numbers(trace: &Trace, crossing: &Crossing, step: &Step, mut corners: [f64; 4
         return Some(Linear { values: range, range, error: 0.0 });
     }
     let ends = crossing.values(&corners);
-    let full = crossing.t[1] - crossing.t[0];
-    let at = |t: f64| {
-        let part = ((t - crossing.t[0]) / full).clamp(0.0, 1.0);
-        (ends[0] + (ends[1] - ends[0]) * part).clamp(range[0], range[1])
+    let at = |place: &Mark| {
+        let value = ends[0] + (ends[1] - ends[0]) * crossing.part(place);
+        value.clamp(range[0], range[1])
     };
+    let values = [at(&step.ends[0]), if step.t[1] == crossing.t[1] { ends[1] } else { at(&step.ends[1]) }];
     let (spread, most) = (range[1] - range[0], range[0].abs().max(range[1].abs()));
-    let moved = (ends[1] - ends[0]).abs() * (16.0 * EPS * trace.reach / full).min(1.0);
-    let error = 2.0 * crossing.loose() * spread + 16.0 * EPS * spread + 4.0 * EPS * most + moved;
-    let values = step.t.map(|t| if t == crossing.t[1] { ends[1] } else { at(t) });
+    let error = 2.0 * crossing.loose() * spread + 16.0 * EPS * spread + 4.0 * EPS * most;
     Some(Linear { values, range, error: error.min(spread) })
 }
 
 /// A texture coordinate along a crossing.
 struct Along {
     /// Where the ray comes in and goes out.
-    ends: [f64; 2],
+    ends: [Dd; 2],
+    /// Bound on their error.
+    error: f64,
     /// Lowest and highest at the corners.
     range: [f64; 2],
     /// The largest magnitude.
@@ -251,7 +270,9 @@ impl Volume {
     fn along(&self, crossing: &Crossing, axis: usize) -> Along {
         let corners = crossing.corners.map(|v| self.coordinates[v as usize][axis]);
         let range = corners.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], &v| [a.min(v), b.max(v)]);
-        Along { ends: crossing.values(&corners), range, size: range[0].abs().max(range[1].abs()) }
+        let size = range[0].abs().max(range[1].abs());
+        let error = 2.0 * crossing.loose() * (range[1] - range[0]) + FINE * size;
+        Along { ends: crossing.passes.each_ref().map(|p| p.fine_value(&corners)), error, range, size }
     }
 
     fn part(&self, trace: &Trace, crossing: &Crossing, made: Part) -> Option<Part> {
@@ -259,22 +280,23 @@ impl Volume {
         for axis in 0..3 {
             let along = self.along(crossing, axis);
             if along.range[0] < 0.0 || along.range[1] > 1.0 {
-                made = cut(trace, crossing, &along, made)?;
+                made = cut(crossing, &along, made, trace.anchor)?;
             }
         }
-        let line = self.line(trace, crossing, made.ends, made.t);
-        line.is_sharp().then_some(Part { what: What::Volume(Line { dt: made.dt, ..line }), ..made })
+        let line = self.line(crossing, made.ends, made.dt);
+        line.is_sharp().then_some(Part { what: What::Volume(line), ..made })
     }
 
-    /// The way through the samples.
-    fn line(&self, trace: &Trace, crossing: &Crossing, ends: [Mark; 2], t: [f64; 2]) -> Line {
+    /// The way through the samples between two places, with `t` counted from the first.
+    fn line(&self, crossing: &Crossing, ends: [Mark; 2], dt: f64) -> Line {
         let roi = self.texture.data_roi();
-        let full = crossing.t[1] - crossing.t[0];
+        let length = distance(&ends[0], &ends[1]);
+        let parts = ends.each_ref().map(|place| crossing.part(place));
         let mut line = Line {
-            anchor: trace.anchor,
-            t,
+            anchor: ends[0].t.hi,
+            t: [0.0, length],
             ends,
-            dt: trace.dt,
+            dt,
             index: [Dd::default(); 3],
             step: [0.0; 3],
             dp: [0.0; 3],
@@ -282,14 +304,14 @@ impl Volume {
         for axis in 0..3 {
             let along = self.along(crossing, axis);
             let (low, count) = (roi.min[axis] as f64, (roi.max[axis] - roi.min[axis]) as f64);
-            let index = |c: f64| Dd::product(c, count).add(Dd::new(low));
-            let [a, b] = along.ends;
-            let step = if along.range[0] == along.range[1] { 0.0 } else { (b - a) * count / full };
-            line.step[axis] = step;
-            line.index[axis] = index(a).add(Dd::product(-crossing.t[0], step));
+            let change = along.ends[1].add(along.ends[0].negate()).hi;
+            let start = along.ends[0].add(Dd::product(change, parts[0]));
+            line.index[axis] = start.scale(count).add(Dd::new(low));
             if along.range[0] < along.range[1] {
-                let round = 16.0 * EPS * (trace.reach * step.abs() + 1.0 + count * along.size);
+                let moved = change * (parts[1] - parts[0]) * count;
                 let spread = (along.range[1] - along.range[0]) * count;
+                let round = 16.0 * EPS * (1.0 + count * along.size + spread);
+                line.step[axis] = moved / length;
                 line.dp[axis] = round + 2.0 * crossing.loose() * spread;
             }
         }
@@ -304,27 +326,35 @@ impl Line {
     }
 }
 
-/// Cuts a part to where a texture coordinate is between 0 and 1.
-fn cut(trace: &Trace, crossing: &Crossing, along: &Along, part: Part) -> Option<Part> {
-    let [a, b] = along.ends;
-    let [t0, t1] = crossing.t;
-    let slope = (b - a) / (t1 - t0);
-    if a == b || !slope.is_normal() {
-        return (0.0..=1.0).contains(&a).then_some(part);
-    }
-    let wrong = 8.0 * EPS * along.size + 2.0 * crossing.loose() * (along.range[1] - along.range[0]);
-    let error = wrong / slope.abs() + 4.0 * EPS * trace.reach;
-    let at = |c: f64| t0 + (c - a) / slope;
-    let (enter, leave) = if slope > 0.0 { (at(0.0), at(1.0)) } else { (at(1.0), at(0.0)) };
+/// Cuts a part to where a texture coordinate is between 0 and 1, ends included: what is 0 or 1 to
+/// double-double precision is so.
+fn cut(crossing: &Crossing, along: &Along, part: Part, anchor: f64) -> Option<Part> {
+    let from = |limit: f64, end: Dd| {
+        let apart = end.add(Dd::new(-limit));
+        if apart.hi.abs() <= along.error { Dd::default() } else { apart }
+    };
     let mut made = part;
-    let mark = |t: f64| Mark::rough(trace.anchor + t, error + 2.0 * EPS * trace.anchor.abs());
-    if enter > made.t[0] {
-        (made.t[0], made.ends[0], made.loose[0]) = (enter, mark(enter), true);
-        made.dt = made.dt.max(error);
-    }
-    if leave < made.t[1] {
-        (made.t[1], made.ends[1], made.loose[1]) = (leave, mark(leave), true);
-        made.dt = made.dt.max(error);
+    for (limit, inside) in [(0.0, 1.0), (1.0, -1.0)] {
+        // How far inside both ends are.
+        let [a, b] = along.ends.map(|end| from(limit, end).scale(inside));
+        if a.hi < 0.0 && b.hi < 0.0 || a.hi <= 0.0 && b.hi <= 0.0 && a.hi != b.hi {
+            return None;
+        }
+        if a.hi.min(b.hi) >= 0.0 {
+            continue;
+        }
+        let change = b.add(a.negate());
+        let [start, end] = &crossing.ends;
+        let length = end.t.add(start.t.negate());
+        let t = start.t.add(length.times(a.negate().over(change)));
+        let error = 2.0 * along.error / change.hi.abs() * length.hi + start.error.max(end.error);
+        let mark = Mark { t, error, fine: error <= 1e-20 * (t.hi.abs() + anchor.abs()) };
+        let side = usize::from(a.hi > 0.0);
+        let further = if side == 0 { mark.order(&made.ends[0]).is_gt() } else { mark.order(&made.ends[1]).is_lt() };
+        if further {
+            (made.t[side], made.ends[side], made.loose[side]) = (mark.from(anchor), mark, true);
+            made.dt = made.dt.max(error);
+        }
     }
     (made.t[0] < made.t[1]).then_some(made)
 }
@@ -332,7 +362,17 @@ fn cut(trace: &Trace, crossing: &Crossing, along: &Along, part: Part) -> Option<
 impl Part {
     /// For pieces of linear fields.
     pub fn stretch(&self) -> Stretch {
-        Stretch { t: self.t, dt: self.dt, loose: self.loose, apart: false }
+        Stretch { t: self.t, dt: self.dt, loose: self.loose, apart: false, stretched: self.rounding() }
+    }
+
+    /// Bound on the error of the length between two places on it, rounded to f64.
+    pub fn rounding(&self) -> f64 {
+        4.0 * EPS * self.t[0].abs().max(self.t[1].abs())
+    }
+
+    /// Where a place on its line through the samples is.
+    pub fn place(&self, t: f64, line: &Line) -> f64 {
+        if t == line.t[1] { self.t[1] } else { (self.t[0] + t).min(self.t[1]) }
     }
 
     /// Has the first of its pieces cover what may hide before it: over a length within the error

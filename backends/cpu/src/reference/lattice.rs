@@ -128,7 +128,7 @@ pub(super) fn pre_integrated(
         let end = sample(medium, voxels, line.point(s.end));
         last = Some((s.end, end));
         let (Some(start), Some(end)) = (start, end) else { continue };
-        let stretch = Stretch { t: [s.start, s.end], dt: 0.0, loose: [false; 2], apart: false };
+        let stretch = Stretch { t: [s.start, s.end], dt: 0.0, loose: [false; 2], apart: false, stretched: 0.0 };
         let linear = [0, 1, 2, 3].map(|i| {
             let (a, b) = (start[i], end[i]);
             Linear { values: [a, b], range: [a.min(b), a.max(b)], error: 0.0 }

@@ -331,7 +331,8 @@ impl March {
         let at = |y: f64| chosen.color.map(|c| cubic::eval(&c, y));
         self.jump(at(a));
         let other = others.min(1.0) * 2.0 * self.brightest;
-        self.add_error(self.t[1] * (chosen.color_error + other + 8.0 * EPS * self.brightest));
+        let wrong = chosen.color_error * depth.min(1.0);
+        self.add_error(self.t[1] * (wrong + other + 8.0 * EPS * self.brightest));
         let length = 0.5 * (chosen.t[1] - chosen.t[0]);
         if self.depth.is_infinite() && self.likely * (-depth).exp() <= self.threshold {
             self.depth = chosen.t[0] + length * (a + 1.0);

@@ -30,6 +30,7 @@ impl Mark {
     }
 
     /// A `t` in f64 with a bound on its error, beside which others are not the same.
+    #[cfg(test)]
     pub fn rough(t: f64, error: f64) -> Self {
         Self { t: Dd::new(t), error, fine: false }
     }

@@ -140,6 +140,15 @@ impl Crossing {
         self.passes.each_ref().map(|p| p.value(corners))
     }
 
+    /// How far along it a place is: 0 to 1, to rounding, however short it is.
+    pub fn part(&self, place: &Mark) -> f64 {
+        let [start, end] = &self.ends;
+        if place.order(end).is_eq() {
+            return 1.0;
+        }
+        (distance(start, place) / distance(start, end)).clamp(0.0, 1.0)
+    }
+
     /// Bound on the error of barycentric weights.
     pub fn loose(&self) -> f64 {
         self.passes[0].loose.max(self.passes[1].loose)
@@ -230,6 +239,11 @@ impl Trace {
         let fits = (0..tracks.len()).filter(|&i| end(&tracks[i]) <= start + self.dt);
         fits.max_by(|&a, &b| end(&tracks[a]).total_cmp(&end(&tracks[b])))
     }
+}
+
+/// The length between two places, without cancellation.
+pub(super) fn distance(from: &Mark, to: &Mark) -> f64 {
+    to.t.add(from.t.negate()).hi
 }
 
 /// What of a track lies in stretches.

@@ -64,8 +64,11 @@ impl Sweep<'_> {
     /// Goes over one stretch, or a hit in a gap; `false` at the end.
     fn step(&mut self, march: &mut March, active: &mut Vec<Piece>) -> bool {
         self.skip_passed(march);
-        let (snap, at) = (self.along.snap, self.last[1]);
-        let start = self.heads().map(|p| p.t[0].max(at)).min_by(f64::total_cmp);
+        let snap = self.along.snap;
+        let mut start = self.start();
+        while start.is_some_and(|start| self.skip_short(march, start)) {
+            start = self.start();
+        }
         active.clear();
         if let Some((t, hit)) = self.along.hits.get(self.hit)
             && start.is_none_or(|start| *t < start - snap)
@@ -83,6 +86,24 @@ impl Sweep<'_> {
         active.extend(self.heads().filter(|p| p.t[0] <= start + snap).map(|p| part(p, [start, end], snap)));
         self.last = [start, end];
         here.iter().all(|(t, hit)| march.meet(hit, *t, active, &self.along.starts)) && march.advance(active)
+    }
+
+    /// Where the next stretch begins.
+    fn start(&self) -> Option<f64> {
+        self.heads().map(|p| p.t[0].max(self.last[1])).min_by(f64::total_cmp)
+    }
+
+    /// Passes over pieces that end within the error of places; `false` where there is none.
+    fn skip_short(&mut self, march: &mut March, start: f64) -> bool {
+        let mut skipped = false;
+        for (track, n) in self.along.tracks.iter().zip(&mut self.next) {
+            while let Some(p) = track.get(*n).filter(|p| p.t[1] <= start + self.along.snap) {
+                march.skip(p);
+                *n += 1;
+                skipped = true;
+            }
+        }
+        skipped
     }
 
     fn heads(&self) -> impl Iterator<Item = &Piece> {
@@ -115,11 +136,11 @@ fn part(p: &Piece, t: [f64; 2], snap: f64) -> Piece {
     let mut made = Piece { t, opacity: restrict(&p.opacity), rest: restrict(&p.rest), ..*p };
     made.color = p.color.each_ref().map(restrict);
     made.color_error += p.color.iter().map(moved).fold(0.0, f64::max);
-    made.opacity_error += moved(&p.rest);
+    // Opacity keeps its course along the piece: its ends are what may be elsewhere.
     if p.kind == Kind::Smooth {
         let least = [-1.0, 0.0, 1.0].map(|y| cubic::eval(&made.rest, y)).into_iter().fold(1.0, f64::min);
         let zone = (4.0 * snap / (t[1] - t[0])).min(2.0);
-        let log = if least > 1e-12 { -least.ln() + 0.7 } else { 3.0 * (8.0 / zone).ln() + 40.0 };
+        let log = if least > 1e-12 { -least.ln() + 3.0 } else { 3.0 * (8.0 / zone).ln() + 40.0 };
         made.edge = p.edge / half.max(1e-300) + zone * log;
         made.edge_color = p.edge_color / half.max(1e-300);
     }

@@ -29,6 +29,8 @@ pub(super) struct Stretch {
     pub loose: [bool; 2],
     /// Whether all ends of pieces are loose, too: between cells of the nearest filter.
     pub apart: bool,
+    /// Bound on the error of its pieces' lengths, with values that keep their places on them.
+    pub stretched: f64,
 }
 
 /// A field that is linear on a stretch.
@@ -109,6 +111,19 @@ impl Piece {
             entry: None,
         }
     }
+
+    /// Accounts for an uncertain length, with opacity and colour that keep their places on it:
+    /// the optical depth is wrong by the same part.
+    pub fn stretch(&mut self, error: f64) {
+        let length = self.t[1] - self.t[0];
+        if self.kind != Kind::Smooth || error <= 0.0 || length <= 0.0 {
+            return;
+        }
+        let ends = [cubic::eval(&self.rest, -1.0), cubic::eval(&self.rest, 1.0)];
+        let (least, most) = (ends[0].min(ends[1]) - self.opacity_error, ends[0].max(ends[1]));
+        let depth = if least > 0.1 * most { -2.0 * least.ln() } else { log_bound(2.0, most) };
+        self.edge += error / length * depth.max(0.0);
+    }
 }
 
 /// A field in a cell.
@@ -148,7 +163,7 @@ impl Cutter {
         for (i, field) in medium.fields.iter().enumerate() {
             locals[i] = Some(local(field, &corners[i], line, cell));
         }
-        let stretch = Stretch { t: cell.t, dt: line.dt, loose: cell.ends, apart: voxels.nearest };
+        let stretch = Stretch { t: cell.t, dt: line.dt, loose: cell.ends, apart: voxels.nearest, stretched: 0.0 };
         self.visit_pieces(medium, &locals[..count], &stretch, &mut visit)
     }
 
@@ -244,6 +259,7 @@ fn piece(medium: &Medium, locals: &[Option<Local<'_>>], stretch: &Stretch, s: [f
     let outer = [s[0] == 0.0, s[1] == 1.0];
     let loose = [0, 1].map(|i| outer[i] && (stretch.apart || stretch.loose[i]));
     loosen_ends(&mut made, loose, stretch.dt);
+    made.stretch(stretch.stretched);
     made
 }
 
@@ -308,10 +324,12 @@ fn loosen_ends(made: &mut Piece, loose: [bool; 2], dt: f64) {
         if let Kind::Opaque { certain } = &mut made.kind {
             *certain &= length > 8.0 * dt;
         } else if made.kind == Kind::Smooth {
-            let zone = 4.0 * dt / length;
+            let zone = (4.0 * dt / length).min(1e300);
             let (near, far) = (cubic::eval(&made.rest, end), cubic::eval(&made.rest, -end));
             let (least, most) = (near - made.opacity_error - 16.0 * EPS * near.max(far), near.max(far));
-            made.edge += if least > 0.5 * near { -2.0 * zone * least.ln() } else { 2.0 * log_bound(zone, most) };
+            // A zone that is longer than the piece has the piece's depth as often as it holds it.
+            let bound = |most: f64| if zone <= 2.0 { log_bound(zone, most) } else { 0.5 * zone * log_bound(2.0, most) };
+            made.edge += if least > 0.5 * near { -2.0 * zone * least.ln() } else { 2.0 * bound(most) };
         }
     }
 }

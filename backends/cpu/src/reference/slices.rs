@@ -12,6 +12,7 @@ use super::{
     line::EPS,
     mark::{Mark, Stretches},
     medium::Voxels,
+    mesh::distance,
     point::{self, Shade},
     prepare::{GridBody, Prepared},
     sight::{Crossing, Sight},
@@ -69,7 +70,7 @@ pub(super) fn of_cells(shape: &Prepared, cells: &Cells, sight: &Sight, way: &Way
         };
         for part in way.tracks.iter().filter_map(|track| track.iter().find(held)) {
             let sure = part.ends[0].compare(&mark).is_some() && mark.compare(&part.ends[1]).is_some();
-            if let Some((values, doubt)) = values(shape, cells, part, &mark, mark.from(way.anchor)) {
+            if let Some((values, doubt)) = values(shape, cells, part, &mark) {
                 let shade = point::shade(&shape.medium, &values, doubt, shape.brightest);
                 hits.push(hit(slices.style, mark, sure, &shade));
             }
@@ -78,27 +79,28 @@ pub(super) fn of_cells(shape: &Prepared, cells: &Cells, sight: &Sight, way: &Way
 }
 
 /// Bounds on the fields at a place on a part of a mesh.
-fn values(shape: &Prepared, cells: &Cells, part: &Part, mark: &Mark, t: f64) -> Option<([[f64; 2]; 4], bool)> {
+fn values(shape: &Prepared, cells: &Cells, part: &Part, mark: &Mark) -> Option<([[f64; 2]; 4], bool)> {
+    let [start, end] = &part.ends;
+    let (t, length) = (distance(start, mark), distance(start, end));
+    let error = mark.error + start.error.max(end.error);
     match (&part.what, &cells.carried) {
         (What::Volume(line), Carried::Volume(volume)) => {
             let at = [0, 1, 2].map(|a| {
                 let moved = Dd::product(line.step[a], t);
-                let error = line.dp[a] + (mark.error + part.dt) * line.step[a].abs();
-                (line.index[a].add(moved), if line.step[a] == 0.0 { line.dp[a] } else { error })
+                (line.index[a].add(moved), line.dp[a] + error * line.step[a].abs())
             });
             point::values(&shape.medium, &Voxels::new(&volume.texture), at)
         }
         (What::Numbers(linear), _) => {
-            let length = part.t[1] - part.t[0];
-            let along = ((t - part.t[0]) / length).clamp(0.0, 1.0);
-            let loose = ((4.0 * EPS * t.abs() + part.dt + mark.error) / length + 4.0 * EPS).min(1.0);
+            let along = (t / length).clamp(0.0, 1.0);
+            let loose = (error / length + 4.0 * EPS).min(1.0);
             let bounds = linear.each_ref().map(|l| {
                 let [a, b] = l.values;
                 if a == b && l.error == 0.0 {
                     return [a; 2];
                 }
-                let (value, wrong) =
-                    (a + (b - a) * along, l.error + (b - a).abs() * loose + 4.0 * EPS * a.abs().max(b.abs()));
+                let value = a + (b - a) * along;
+                let wrong = l.error + (b - a).abs() * loose + 4.0 * EPS * a.abs().max(b.abs());
                 [value - wrong, value + wrong]
             });
             Some((bounds, false))

@@ -60,6 +60,8 @@ pub(super) struct Pass {
     pub corners: [usize; 3],
     /// Their barycentric weights.
     pub weights: [f64; 3],
+    /// The same in double-double.
+    fine: [Dd; 3],
     pub tau: Dd,
     /// Bound on the error of a weight.
     pub loose: f64,
@@ -137,13 +139,14 @@ impl Sheared {
         let wrong = 16.0 * self.fuzz * reach / sum.hi.abs();
         let loose = if wrong < 1.0 { wrong } else { 1.0 };
         let part = |e: Dd| if sum.hi == 0.0 { Dd::new(1.0 / 3.0) } else { e.over(sum) };
-        let [_, v, w] = edges.map(part);
+        let fine = edges.map(part);
+        let weights = fine.map(|w| w.hi.clamp(0.0, 1.0));
+        let [_, v, w] = fine;
         let tau = a.tau.add(v.times(b.tau.add(a.tau.negate()))).add(w.times(c.tau.add(a.tau.negate())));
         let low = a.tau.hi.min(b.tau.hi).min(c.tau.hi);
         let high = a.tau.hi.max(b.tau.hi).max(c.tau.hi);
-        let weights = edges.map(|e| part(e).hi.clamp(0.0, 1.0));
         let error = 2.0 * loose * (high - low) + 4.0 * FINE * low.abs().max(high.abs());
-        Pass { corners, weights, tau, loose, error }
+        Pass { corners, weights, fine, tau, loose, error }
     }
 }
 
@@ -153,6 +156,13 @@ impl Pass {
     pub fn value(&self, field: &[f64; 4]) -> f64 {
         let [a, b, c] = self.corners.map(|i| field[i]);
         a + (self.weights[1] * (b - a) + self.weights[2] * (c - a))
+    }
+
+    /// The same in double-double.
+    pub fn fine_value(&self, field: &[f64; 4]) -> Dd {
+        let [a, b, c] = self.corners.map(|i| Dd::new(field[i]));
+        let rise = |to: Dd, weight: Dd| weight.times(to.add(a.negate()));
+        a.add(rise(b, self.fine[1])).add(rise(c, self.fine[2]))
     }
 }
 

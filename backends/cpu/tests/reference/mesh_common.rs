@@ -63,10 +63,8 @@ impl Parts {
     /// The tetrahedra for which a rule says so, and the others.
     pub fn split(&self, mut rule: impl FnMut(usize) -> bool) -> [Self; 2] {
         let (yes, no): (Vec<_>, Vec<_>) = (0..self.tetrahedra.len()).partition(|&i| rule(i));
-        [yes, no].map(|chosen| Self {
-            tetrahedra: chosen.into_iter().map(|i| self.tetrahedra[i]).collect(),
-            ..self.clone()
-        })
+        [yes, no]
+            .map(|chosen| Self { tetrahedra: chosen.into_iter().map(|i| self.tetrahedra[i]).collect(), ..self.clone() })
     }
 
     /// Puts a point into a tetrahedron and joins it to the four faces.
@@ -188,9 +186,8 @@ pub fn views() -> Vec<FrameDesc> {
     let cube = volact_core::Aabb::new(DVec3::ZERO, DVec3::ONE);
     let middle = DVec3::splat(0.5);
     // Nine by nine pixels an eighth apart: the outer ones see the cube's faces from the side.
-    let grid = |to: DVec3, up: DVec3| {
-        FrameDesc::new(Camera::orthographic(middle - 3.0 * to, middle, up, 9.0 / 8.0), 9, 9)
-    };
+    let grid =
+        |to: DVec3, up: DVec3| FrameDesc::new(Camera::orthographic(middle - 3.0 * to, middle, up, 9.0 / 8.0), 9, 9);
     vec![
         FrameDesc::new(Camera::fit(&cube, View::Iso, 11, 9), 11, 9),
         grid(DVec3::Z, DVec3::Y),
