@@ -1,5 +1,7 @@
 //! Clip planes and crop boxes, for a shape and for a scene.
 
+use std::slice::from_ref;
+
 use volact_conformance::{
     meshes::{bent, field},
     metrics::{identical, max_error, outside, within},
@@ -115,12 +117,12 @@ fn a_crop_box_is_a_smaller_block() {
     let bounds = Aabb::new(DVec3::new(1.3, 2.1, 0.7), DVec3::new(5.9, 7.0, 6.4));
     shape.set_clip(Clip::new([ClipRegion::crop(bounds)]));
     let small = Shape::new(Block::from(bounds), look("lut", table(), 1.0).with("volume", VolumeTexture::new(&data)));
-    within("reference", outside(&truth(&[shape.clone()], &view()).color, &truth(&[small.clone()], &view())), 1e-8);
+    within("reference", outside(&truth(from_ref(&shape), &view()).color, &truth(from_ref(&small), &view())), 1e-8);
     for step in [0.5, 0.17] {
         let setup = Setup::post(step);
         within(
             "cpu",
-            max_error(&setup.colors(&[shape.clone()], &view()), &setup.colors(&[small.clone()], &view())),
+            max_error(&setup.colors(from_ref(&shape), &view()), &setup.colors(from_ref(&small), &view())),
             1e-5,
         );
     }
@@ -142,9 +144,9 @@ fn clips_follow_mirrored_and_sheared_shapes() {
     shape.set_transform(nested);
     let by_scene = desc.clone().with_clip(clip.transformed(&nested));
     for setup in [Setup::exact(), Setup::post(0.3)] {
-        let wanted = setup.colors(&[shape.clone()], &by_scene);
+        let wanted = setup.colors(from_ref(&shape), &by_scene);
         shape.set_clip(clip.clone());
-        within(&format!("{setup:?}"), max_error(&setup.colors(&[shape.clone()], &desc), &wanted), 1e-5);
+        within(&format!("{setup:?}"), max_error(&setup.colors(from_ref(&shape), &desc), &wanted), 1e-5);
         shape.set_clip(Clip::NONE);
     }
 }
@@ -160,7 +162,7 @@ fn cpu_clips_as_the_reference_does_with_every_compositing() {
         shape.set_shader(shader);
         let desc = view().with_clip(clip.clone());
         let (found, wanted) = (Setup::post(0.3), Setup::rays(0.3));
-        let (found, wanted) = (found.draw(&[shape.clone()], &desc), wanted.draw(&[shape.clone()], &desc));
+        let (found, wanted) = (found.draw(from_ref(&shape), &desc), wanted.draw(from_ref(&shape), &desc));
         use volact_conformance::metrics::wide;
         within(shader, max_error(&wide(&found), &wide(&wanted)), 1e-5);
     }
