@@ -71,6 +71,7 @@ pub(super) struct Pass {
 
 /// What a ray does at a tetrahedron.
 #[derive(Clone, Copy, Debug)]
+#[expect(clippy::large_enum_variant, reason = "made and used in one place, never stored")]
 pub(super) enum Meeting {
     Miss,
     /// In through the first face and out through the second.
