@@ -189,7 +189,7 @@ fn cells_without_a_value_are_transparent() {
     let table = table(&[point(0.0, [0.0; 3], 0.0), point(1.0, RED, 0.5)]);
     for (other, opacity) in [(f64::INFINITY, 0.5), (f64::NEG_INFINITY, 0.0)] {
         let shape = field(&corner(), |p| if p.z > 0.5 { other } else { 0.25 }, table.clone(), 1.0);
-        let absorbed = -(0.5 * (-opacity).ln_1p()).exp_m1();
+        let absorbed = -f64::exp_m1(0.5 * f64::ln_1p(-opacity));
         certify(&[shape], &along_z(0.25, 0.25), [absorbed, 0.25 * absorbed, 0.0, absorbed]);
     }
     let shape = field(&corner(), |p| (p.x - p.y) * f64::INFINITY, table, 1.0);
