@@ -2,7 +2,7 @@
 //!
 //! Where no ray meets two at the same place, and nothing without thickness lies inside one, each
 //! gets passes of its kernel from front to back, which go on from what the ones before left;
-//! otherwise they are put together by a [`sweep`](super::sweep). The cells of a mesh that is the only
+//! otherwise they are put together by a [`sweep`]. The cells of a mesh that is the only
 //! shape have no lattice: they are passed up to each such thing, and then from there on.
 
 use volact_core::lattice::Lattice;
