@@ -62,10 +62,8 @@ fn check_mesh(loader: &str, storage: &Storage, path: &str, options: &LoadOptions
     let bounds = data.geometry.bounds();
     assert!(bounds.min.is_finite() && bounds.max.is_finite());
     let made = data.geometry.tessellate().expect("a mesh that was accepted can be cut");
-    // The volume of numbers near the largest is not finite, which is not the loader's to say.
-    if bounds.min.abs().max(bounds.max.abs()).max_element() < 1e60 {
-        made.validate(loader).expect("what was cut is right");
-    }
+    assert!(made.tetrahedra.iter().flatten().all(|i| (*i as usize) < made.vertices.len()));
+    assert!(made.vertices.len() >= vertices);
 }
 
 fn single_mesh(loader: &str, path: &str, data: &[u8]) {

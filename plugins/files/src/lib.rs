@@ -9,6 +9,9 @@
 //!   while such a volume lives, its file must not be changed or cut.
 //! - Regions of uncompressed formats are read by seeking; of compressed ones by decoding up to the
 //!   region's end and keeping the region only.
+//! - Meshes and surfaces are read whole, with all numbers of their vertices. Arrays are shared with
+//!   a mapped file where it has them raw, aligned and in native byte order.
+//! - Memory is taken for what a file can hold, never on the word of a header.
 //! - World space of medical formats is LPS.
 
 mod decode;

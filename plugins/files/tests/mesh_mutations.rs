@@ -82,10 +82,8 @@ fn check(data: &MeshData, what: &str) {
     let cells = cells.or_else(|| any.downcast_ref::<StructuredMesh>().map(|m| m.cells().count()));
     assert!(cells.unwrap() > 0, "{what}");
     let made = data.geometry.tessellate().unwrap();
-    // Volumes of numbers near the largest are not finite, which is not the loader's to say.
-    if data.geometry.bounds().max.abs().max_element().max(data.geometry.bounds().min.abs().max_element()) < 1e60 {
-        made.validate(what).unwrap();
-    }
+    assert!(made.tetrahedra.iter().flatten().all(|i| (*i as usize) < made.vertices.len()), "{what}");
+    assert!(made.vertices.iter().all(|p| p.is_finite()), "{what}");
 }
 
 fn read(loader: &str, path: &str, files: &[(String, Vec<u8>)]) -> Option<MeshData> {
