@@ -129,3 +129,22 @@ fn vector_units_agree() {
         }
     }
 }
+
+/// Steps between shapes that are far apart are not counted one by one.
+#[test]
+fn gaps_between_shapes_cost_nothing() {
+    let volume = super::scenes::ball(volact_core::ScalarType::U8);
+    let shapes: Vec<Shape> = (0..4)
+        .map(|i| {
+            let shape = super::scenes::lut(&volume, super::scenes::warm());
+            let far = volact_core::glam::DVec3::new(-14.0, 30.0, -17.0) * if i < 2 { 0.0 } else { 1e8 } + f64::from(i);
+            shape.set_transform(volact_core::glam::DAffine3::from_translation(far));
+            shape
+        })
+        .collect();
+    let desc = all(8).swap_remove(0).desc;
+    let near = draw(&mut *cpu(STEP, &[]), &shapes[..2], &desc);
+    let both = draw(&mut *cpu(STEP, &[]), &shapes, &desc);
+    assert!(near.color.iter().any(|c| c[3] > 0.0));
+    assert!(near.color.iter().zip(&both.color).all(|(a, b)| b[3] >= a[3]));
+}

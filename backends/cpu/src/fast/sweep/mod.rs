@@ -85,7 +85,7 @@ struct Left {
 pub fn draw(unit: Unit, scene: &Scene<'_>, pixels: &mut Pixels, counts: &mut Counts) {
     let mut sweep = Sweep::new(unit, scene, pixels, counts);
     let mut behind = f64::NEG_INFINITY;
-    if let Some([first, last]) = sweep.range() {
+    for [first, last] in sweep.ranges() {
         let [start, end] = [first, last].map(|chunk| (chunk * CHUNK as i64) as f64 * scene.step);
         sweep.outside(behind, start);
         behind = end;
@@ -158,13 +158,20 @@ impl<'a> Sweep<'a> {
         }
     }
 
-    /// Chunks in which layers have segments: the first, and one after the last.
-    fn range(&self) -> Option<[i64; 2]> {
+    /// Chunks in which layers have segments: runs of them, each from a first one to one after the
+    /// last. They do not depend on what is skipped.
+    fn ranges(&self) -> Vec<[i64; 2]> {
         let whole = self.walks.iter().filter_map(|w| w.cuts.whole()).map(|[a, b]| [a, b - 1]);
         let cut = self.cuts.iter().flatten().map(|c| [c.k, c.k]);
-        let all = whole.chain(cut).reduce(|[a, b], [c, d]| [a.min(c), b.max(d)])?;
         let chunk = |k: i64| k.div_euclid(CHUNK as i64);
-        Some([chunk(all[0]), chunk(all[1]) + 1])
+        let mut runs: Vec<_> = whole.chain(cut).map(|[a, b]| [chunk(a), chunk(b) + 1]).collect();
+        runs.sort_unstable();
+        runs.dedup_by(|next, last| {
+            let joined = next[0] <= last[1];
+            last[1] = if joined { last[1].max(next[1]) } else { last[1] };
+            joined
+        });
+        runs
     }
 
     /// Adds one chunk.
