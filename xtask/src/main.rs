@@ -1,6 +1,7 @@
 //! What people who work on Volact repeat: `cargo xtask --help`.
 
 mod check;
+mod mesh_peers;
 mod peer;
 mod peer_scene;
 mod peers;
@@ -25,6 +26,8 @@ enum Task {
     Peer(peer::Args),
     /// Compare with other renderers in one run, interleaved, and write the tables.
     Peers(peers::Args),
+    /// Compare with VTK's mappers of unstructured grids on real meshes, in turn, and write the table.
+    MeshPeers(mesh_peers::Args),
     /// Time `cpu` over picture sizes, volume sizes and threads.
     Scaling,
 }
@@ -35,6 +38,7 @@ fn main() -> anyhow::Result<()> {
         Task::Check => check::all(),
         Task::Peer(args) => peer::run(&args),
         Task::Peers(args) => peers::run(&args),
+        Task::MeshPeers(args) => mesh_peers::run(&args),
         Task::Scaling => scaling::run(),
     }
 }

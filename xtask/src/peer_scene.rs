@@ -68,8 +68,9 @@ impl PeerScene {
             "mip" => "mip",
             other => bail!("mode {other:?} is not drawn yet, wanted dvr or mip"),
         };
-        let appearance =
-            Appearance::new(shader).with("lookup_table", self.table()?).with("unit_distance", self.tf.unit_distance);
+        let appearance = Appearance::new(shader)
+            .with("lookup_table", table(&self.tf.color, &self.tf.opacity)?)
+            .with("unit_distance", self.tf.unit_distance);
         Ok(Shape::around(&volume, appearance))
     }
 
@@ -85,25 +86,25 @@ impl PeerScene {
         let [r, g, b] = self.background;
         Ok(FrameDesc::new(camera, size, size).with_background([r, g, b, 1.0]))
     }
-
-    /// Colour and opacity have control points of their own: the table takes the positions of both.
-    fn table(&self) -> Result<LookupTable> {
-        let mut values: Vec<f64> =
-            self.tf.color.iter().map(|c| c[0]).chain(self.tf.opacity.iter().map(|o| o[0])).collect();
-        values.sort_by(f64::total_cmp);
-        values.dedup();
-        let color: [Vec<[f64; 2]>; 3] =
-            std::array::from_fn(|c| self.tf.color.iter().map(|r| [r[0], r[c + 1]]).collect());
-        let point = |&value: &f64| ControlPoint {
-            value,
-            color: [0, 1, 2].map(|c| interpolate(&color[c], value)),
-            opacity: interpolate(&self.tf.opacity, value),
-        };
-        Ok(LookupTable::from_points(values.iter().map(point).collect::<Vec<_>>())?)
-    }
 }
 
-fn interpolate(points: &[[f64; 2]], x: f64) -> f64 {
+/// A table of control points for colour (value, red, green, blue) and others for opacity (value,
+/// opacity): it takes the positions of both.
+pub fn table(colors: &[[f64; 4]], opacities: &[[f64; 2]]) -> Result<LookupTable> {
+    let mut values: Vec<f64> = colors.iter().map(|c| c[0]).chain(opacities.iter().map(|o| o[0])).collect();
+    values.sort_by(f64::total_cmp);
+    values.dedup();
+    let color: [Vec<[f64; 2]>; 3] = std::array::from_fn(|c| colors.iter().map(|r| [r[0], r[c + 1]]).collect());
+    let point = |&value: &f64| ControlPoint {
+        value,
+        color: [0, 1, 2].map(|c| interpolate(&color[c], value)),
+        opacity: interpolate(opacities, value),
+    };
+    Ok(LookupTable::from_points(values.iter().map(point).collect::<Vec<_>>())?)
+}
+
+/// Linear between points (position, value), constant outside.
+pub fn interpolate(points: &[[f64; 2]], x: f64) -> f64 {
     let after = points.partition_point(|p| p[0] <= x);
     match (after.checked_sub(1).map(|i| points[i]), points.get(after)) {
         (Some(a), Some(b)) => a[1] + (b[1] - a[1]) * (x - a[0]) / (b[0] - a[0]),

@@ -1,7 +1,14 @@
 //! `cargo xtask peers`: other renderers on the same scenes against one ground truth, interleaved
 //! with Volact, by the driver of the peers' folder (`VOLACT_PEERS`).
 
-use std::{collections::BTreeMap, env, fmt::Write as _, fs, path::PathBuf, process::Command};
+use std::{
+    collections::BTreeMap,
+    env,
+    fmt::Write as _,
+    fs,
+    path::{Path, PathBuf},
+    process::Command,
+};
 
 use anyhow::{Context, Result, bail};
 use serde_json::Value;
@@ -39,16 +46,28 @@ pub fn run(args: &Args) -> Result<()> {
     let text = fs::read_to_string(&args.log).with_context(|| format!("{}: cannot be read", args.log.display()))?;
     let rows: Vec<Value> = text.lines().filter_map(|l| serde_json::from_str(l).ok()).collect();
     let tables = tables(&rows);
-    let document = fs::read_to_string(&args.report).unwrap_or_else(|_| format!("{BEGIN}\n{END}\n"));
-    let (Some(begin), Some(end)) = (document.find(BEGIN), document.find(END)) else {
-        bail!("{}: has no lines {BEGIN:?} and {END:?}", args.report.display());
+    replace(&args.report, [BEGIN, END], &tables)
+}
+
+/// Puts text between two marks of a document.
+pub fn replace(path: &Path, [begin, end]: [&str; 2], text: &str) -> Result<()> {
+    let document = fs::read_to_string(path).unwrap_or_else(|_| format!("{begin}\n{end}\n"));
+    let (Some(from), Some(to)) = (document.find(begin), document.find(end)) else {
+        bail!("{}: has no lines {begin:?} and {end:?}", path.display());
     };
-    let written = format!("{}{BEGIN}\n{tables}{}", &document[..begin], &document[end..]);
-    let temporary = args.report.with_extension("tmp");
+    let written = format!("{}{begin}\n{text}{}", &document[..from], &document[to..]);
+    let temporary = path.with_extension("tmp");
     fs::write(&temporary, written).with_context(|| format!("{}: cannot be written", temporary.display()))?;
-    fs::rename(&temporary, &args.report)?;
-    println!("{}: tables written", args.report.display());
+    fs::rename(&temporary, path)?;
+    println!("{}: tables written", path.display());
     Ok(())
+}
+
+/// The middle of some numbers; not a number where there are none.
+pub fn median(numbers: &[f64]) -> f64 {
+    let mut sorted = numbers.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted.get(sorted.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
 fn measure(args: &Args) -> Result<()> {

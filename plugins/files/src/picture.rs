@@ -212,21 +212,23 @@ fn read_npy(path: &Path, mut file: BufReader<fs::File>) -> Result<Picture, LoadE
     let mut header = vec![0; usize::from(u16::from_le_bytes([start[8], start[9]]))];
     file.read_exact(&mut header).map_err(|e| LoadError::io(path, e))?;
     let header = String::from_utf8_lossy(&header).into_owned();
-    let wanted = "version 1.0, little-endian float32 in C order, height x width x 4";
+    let wanted = "version 1.0, little-endian float32 in C order, height x width x 3 or 4";
     let bad = || LoadError::invalid(path, "NumPy header", format!("{:?}", header.trim()), wanted);
     let good = start[6..8] == [1, 0] && header.contains("'<f4'") && header.contains("'fortran_order': False");
     let shape = header.split_once("'shape': (").and_then(|(_, rest)| rest.split_once(')')).map(|(inside, _)| inside);
     let shape: Vec<u64> = shape.unwrap_or("").split(',').filter_map(|word| word.trim().parse().ok()).collect();
-    let (&[height, width, 4], true) = (&shape[..], good) else { return Err(bad()) };
-    let pixels = check_pixels(path, width, height)?;
+    let (&[height, width, channels @ (3 | 4)], true) = (&shape[..], good) else { return Err(bad()) };
+    let wanted = check_pixels(path, width, height)? * 4 * channels;
     let mut bytes = Vec::new();
-    file.take(pixels * 16 + 1).read_to_end(&mut bytes).map_err(|e| LoadError::io(path, e))?;
-    if bytes.len() as u64 != pixels * 16 {
+    file.take(wanted + 1).read_to_end(&mut bytes).map_err(|e| LoadError::io(path, e))?;
+    if bytes.len() as u64 != wanted {
         let (what, found) = ("pixels".into(), bytes.len() as u64);
-        return Err(LoadError::Truncated { path: path.into(), what, found, wanted: pixels * 16 });
+        return Err(LoadError::Truncated { path: path.into(), what, found, wanted });
     }
     let value = |p: &[u8], n: usize| f32::from_le_bytes([p[4 * n], p[4 * n + 1], p[4 * n + 2], p[4 * n + 3]]);
-    let rgba = bytes.chunks_exact(16).map(|p| std::array::from_fn(|n| value(p, n))).collect();
+    // Without a fourth channel the picture is opaque.
+    let pixel = |p: &[u8]| std::array::from_fn(|n| if 4 * n < p.len() { value(p, n) } else { 1.0 });
+    let rgba = bytes.chunks_exact(4 * channels as usize).map(pixel).collect();
     Ok(Picture { width: width as usize, height: height as usize, rgba })
 }
 

@@ -79,6 +79,13 @@ fn npy_is_laid_out_as_numpy_says() {
     assert!(header.ends_with('\n'));
     assert_eq!(bytes.len(), 10 + length + 6 * 16);
     assert_eq!(bytes[10 + length..14 + length], 1f32.to_le_bytes());
+    // Other programs write three channels: an opaque picture.
+    let mut three = bytes[..10 + length].to_vec();
+    let at = three.windows(2).position(|w| w == b"4)").unwrap();
+    three[at] = b'3';
+    three.extend([1.0f32, 2.0, 3.0].repeat(6).iter().flat_map(|v| v.to_le_bytes()));
+    fs::write(&path, three).unwrap();
+    assert_eq!(load_picture(&path).unwrap().rgba, [[1.0, 2.0, 3.0, 1.0]; 6]);
 }
 
 #[test]
