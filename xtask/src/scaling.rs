@@ -1,15 +1,25 @@
-//! `cargo xtask scaling`: how the time of `cpu` grows with rays, with the volume, and with threads.
+//! `cargo xtask scaling`: how the time of `cpu` grows with rays, with the volume, and with threads,
+//! and what ways of drawing cost beside the plain one.
 
 use std::time::Instant;
 
 use anyhow::Result;
 use volact_core::{
     Appearance, ControlPoint, FrameDesc, LookupTable, Options, Registry, ScalarType, Shape, View, Volume, VolumeDesc,
-    glam::DVec3,
+    glam::{DAffine3, DVec3},
 };
+
+use crate::peers::median;
 
 /// Frames timed; the median counts.
 const FRAMES: usize = 9;
+
+/// What a frame costs.
+struct Cost {
+    ms: f64,
+    rays: u64,
+    samples: u64,
+}
 
 /// Runs it and prints tables.
 pub fn run() -> Result<()> {
@@ -25,35 +35,74 @@ pub fn run() -> Result<()> {
     for threads in [1, 2] {
         row(&registry, 512, 256, threads)?;
     }
-    Ok(())
+    ways(&registry)
 }
 
 /// The same 256 world units, with `n` samples along each side, one sample of a ray a world unit.
 fn row(registry: &Registry, size: usize, n: usize, threads: i64) -> Result<()> {
-    let shape = ripples(n)?;
     let options = Options::from([("sample_distance".into(), 1.0.into()), ("threads".into(), threads.into())]);
-    let mut action = registry.action("cpu", &options)?;
-    action.manage(&shape)?;
-    let desc = FrameDesc::fit(&shape, View::Iso, size, size);
+    let Cost { ms, rays, samples } = time(registry, &options, &[ripples(n)?], size)?;
+    let threads = if threads == 0 { "all".to_owned() } else { threads.to_string() };
+    let (ray, rate) = (ms * 1e6 / rays as f64, samples as f64 / ms / 1e3);
+    println!("| {size}² | {n}³ | {threads} | {ms:.1} | {ray:.0} | {rate:.0} |");
+    Ok(())
+}
+
+/// The same volume by other ways.
+fn ways(registry: &Registry) -> Result<()> {
+    println!("\n| drawn | ms | times the first | million samples a second |\n|---|---|---|---|");
+    let shape = ripples(128)?;
+    let other = || -> Result<Shape> {
+        let other = shape.named("other");
+        other.set_transform(DAffine3::from_translation(DVec3::new(128.0, 0.0, 0.0)));
+        Ok(other)
+    };
+    let apart = shape.named("apart");
+    apart.set_transform(DAffine3::from_translation(DVec3::new(256.0, 0.0, 0.0)));
+    let pre = shape.named("pre-interpolated");
+    pre.set_parameter("lookup_table", table()?.pre_interpolated());
+    let simple = shape.named("simple");
+    simple.set_shader("simple");
+    simple.set_parameter("unit_distance", 100.0);
+    let scenes = [
+        ("one shape", vec![shape.clone()]),
+        ("the same, classified in the middle of segments", vec![shape.clone()]),
+        ("two shapes apart", vec![shape.clone(), apart]),
+        ("two shapes that overlap by half", vec![shape.clone(), other()?]),
+        ("three in the same place", vec![shape.clone(), shape.named("second"), shape.named("third")]),
+        ("one shape, pre-interpolated table", vec![pre]),
+        ("one shape, shader `simple`", vec![simple]),
+    ];
+    let mut first = None;
+    for (i, (name, shapes)) in scenes.iter().enumerate() {
+        let mut options = Options::from([("sample_distance".into(), 1.0.into())]);
+        if i == 1 {
+            options.insert("classification".into(), "post".into());
+        }
+        let Cost { ms, samples, .. } = time(registry, &options, shapes, 512)?;
+        let times = ms / *first.get_or_insert(ms);
+        println!("| {name} | {ms:.1} | {times:.2} | {:.0} |", samples as f64 / ms / 1e3);
+    }
+    Ok(())
+}
+
+fn time(registry: &Registry, options: &Options, shapes: &[Shape], size: usize) -> Result<Cost> {
+    let mut action = registry.action("cpu", options)?;
+    shapes.iter().try_for_each(|shape| action.manage(shape))?;
+    let desc = FrameDesc::fit_all(shapes, View::Iso, size, size);
     let mut times = Vec::new();
-    let mut samples = 0;
-    let mut rays = 0;
+    let (mut samples, mut rays) = (0, 0);
     for frame in 0..=FRAMES {
         let start = Instant::now();
         action.begin_draw(&desc)?;
-        action.draw(&shape)?;
+        shapes.iter().try_for_each(|shape| action.draw(shape))?;
         let drawn = action.end_draw()?;
         if frame > 0 {
             times.push(start.elapsed().as_secs_f64() * 1e3);
         }
         (samples, rays) = (drawn.statistics.samples, drawn.statistics.rays);
     }
-    times.sort_by(f64::total_cmp);
-    let ms = times[FRAMES / 2];
-    let threads = if threads == 0 { "all".to_owned() } else { threads.to_string() };
-    let (ray, rate) = (ms * 1e6 / rays as f64, samples as f64 / ms / 1e3);
-    println!("| {size}² | {n}³ | {threads} | {ms:.1} | {ray:.0} | {rate:.0} |");
-    Ok(())
+    Ok(Cost { ms: median(&times), rays, samples })
 }
 
 /// A smooth field that is semi-transparent everywhere, so that nothing is skipped.
@@ -70,8 +119,11 @@ fn ripples(n: usize) -> Result<Shape> {
     }
     let spacing = DVec3::splat(256.0 / (n - 1) as f64);
     let desc = VolumeDesc { spacing, ..VolumeDesc::new([n; 3], ScalarType::U8, 1) };
-    let point = |value, grey, opacity| ControlPoint { value, color: [grey; 3], opacity };
-    let table = LookupTable::from_points([point(0.0, 0.2, 0.001), point(255.0, 1.0, 0.01)])?;
-    let appearance = Appearance::new("lut").with("lookup_table", table).with("unit_distance", 1.0);
+    let appearance = Appearance::new("lut").with("lookup_table", table()?).with("unit_distance", 1.0);
     Ok(Shape::around(&Volume::new(desc, voxels)?, appearance))
+}
+
+fn table() -> Result<LookupTable> {
+    let point = |value, grey, opacity| ControlPoint { value, color: [grey; 3], opacity };
+    Ok(LookupTable::from_points([point(0.0, 0.2, 0.001), point(255.0, 1.0, 0.01)])?)
 }
