@@ -225,7 +225,7 @@ fn prepare(row: Row, args: &Args, data: &Path) -> Result<Own> {
     let stats = &frame.statistics;
     let cost = Cost {
         name: row.mesh.clone(),
-        tetrahedra: row.tetrahedra,
+        tetrahedra: mesh.geometry.tessellate()?.tetrahedra.len() as u64,
         ms: 0.0,
         first_ms,
         bytes: stats.resident_bytes,
