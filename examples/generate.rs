@@ -181,7 +181,7 @@ fn cells() -> Vec<u8> {
     points.extend([on(BRAIN, UP, 0), on(ALL, UP, 0)]);
     let mut cells: Vec<(u8, Vec<usize>)> = Vec::new();
     for (a, b) in (0..AROUND).map(|a| (a, a + 1)) {
-        let missing = a < 7 || a > 21;
+        let missing = !(7..=21).contains(&a);
         cells.push((13, vec![deep, foot(a), foot(b), middle, dome(0, a), dome(0, b)]));
         let base = [foot(a), wide(a), wide(b), foot(b)];
         cells.push((12, [base, [dome(0, a), shell(0, a), shell(0, b), dome(0, b)]].concat()));
