@@ -22,6 +22,12 @@ pub const EXAMPLES: [Example; 3] = [
     Example { path: "part/part.nrrd", dims: [96, 64, 64], spacing: 1.0, value: part },
 ];
 
+/// A file of another kind, and what is in it.
+pub type File = (&'static str, fn() -> Vec<u8>);
+
+/// The meshes and surfaces.
+pub const FILES: [File; 3] = [("carved/cells.vtk", cells), ("spring/ring.obj", ring), ("spring/spring.obj", spring)];
+
 impl Example {
     /// The voxels, x fastest.
     pub fn voxels(&self) -> Vec<u8> {
@@ -142,4 +148,124 @@ fn cylinder([across, along]: [f64; 2], radius: f64, half: f64) -> f64 {
 fn blend(a: f64, b: f64, fillet: f64) -> f64 {
     let h = (0.5 + 0.5 * (b - a) / fillet).clamp(0.0, 1.0);
     b + (a - b) * h - fillet * h * (1.0 - h)
+}
+
+/// Cells that fill the box of the head but for a part of its shell: in object space of the head.
+///
+/// Around the middle of the brain a dome of pyramids, just larger than the brain; around that a
+/// shell of hexahedra, of which the front left of the upper half is missing; both stand on prisms.
+fn cells() -> Vec<u8> {
+    const AROUND: usize = 24;
+    const UP: usize = 6;
+    const MIDDLE: [f64; 3] = [86.9, 108.5, 140.9];
+    const BRAIN: [f64; 3] = [52.7, 69.7, 55.8];
+    const ALL: [f64; 3] = [95.0, 115.0, 85.0];
+    const BOTTOM: f64 = -2.0;
+    // The dome's rings from its foot upwards, the shell's, and their feet at the bottom.
+    let dome = |l: usize, a: usize| 2 + l * AROUND + a % AROUND;
+    let shell = |l: usize, a: usize| dome(UP + l, a);
+    let foot = |a: usize| dome(2 * UP, a);
+    let wide = |a: usize| dome(2 * UP + 1, a);
+    let (middle, deep, top, above) = (0, 1, wide(0) + AROUND, wide(0) + AROUND + 1);
+    let on = |radii: [f64; 3], l: usize, a: usize| {
+        let [up, turn] =
+            [l as f64 / UP as f64 / 4.0, a as f64 / AROUND as f64].map(|part| part * std::f64::consts::TAU);
+        let unit = [up.cos() * turn.sin(), -up.cos() * turn.cos(), up.sin()];
+        std::array::from_fn(|i| MIDDLE[i] + radii[i] * unit[i])
+    };
+    let rings = |radii| (0..UP * AROUND).map(move |i| on(radii, i / AROUND, i % AROUND));
+    let low = |[x, y, _]: [f64; 3]| [x, y, BOTTOM];
+    let mut points: Vec<[f64; 3]> = vec![MIDDLE, low(MIDDLE)];
+    points.extend(rings(BRAIN).chain(rings(ALL)));
+    points.extend((0..AROUND).map(|a| low(on(BRAIN, 0, a))).chain((0..AROUND).map(|a| low(on(ALL, 0, a)))));
+    points.extend([on(BRAIN, UP, 0), on(ALL, UP, 0)]);
+    let mut cells: Vec<(u8, Vec<usize>)> = Vec::new();
+    for (a, b) in (0..AROUND).map(|a| (a, a + 1)) {
+        let missing = !(7..=21).contains(&a);
+        cells.push((13, vec![deep, foot(a), foot(b), middle, dome(0, a), dome(0, b)]));
+        let base = [foot(a), wide(a), wide(b), foot(b)];
+        cells.push((12, [base, [dome(0, a), shell(0, a), shell(0, b), dome(0, b)]].concat()));
+        for l in 0..UP - 1 {
+            let face = |ring: &dyn Fn(usize, usize) -> usize| [ring(l, a), ring(l, b), ring(l + 1, b), ring(l + 1, a)];
+            let [p, q, r, s] = face(&dome);
+            cells.push((14, vec![s, r, q, p, middle]));
+            cells.extend((!missing).then(|| (12, [face(&dome), face(&shell)].concat())));
+        }
+        let (inner, outer) = ([dome(UP - 1, a), dome(UP - 1, b), top], [shell(UP - 1, a), shell(UP - 1, b), above]);
+        cells.push((10, vec![inner[1], inner[0], top, middle]));
+        cells.extend((!missing).then(|| (13, [inner, outer].concat())));
+    }
+    legacy_vtk(&points, &cells)
+}
+
+/// An unstructured grid of cells with the types of VTK, as text.
+fn legacy_vtk(points: &[[f64; 3]], cells: &[(u8, Vec<usize>)]) -> Vec<u8> {
+    let numbers: usize = cells.iter().map(|(_, corners)| 1 + corners.len()).sum();
+    let point = |[x, y, z]: &[f64; 3]| format!("{x:.2} {y:.2} {z:.2}\n");
+    let cell = |(_, corners): &(u8, Vec<usize>)| {
+        let corners: Vec<_> = corners.iter().map(usize::to_string).collect();
+        format!("{} {}\n", corners.len(), corners.join(" "))
+    };
+    let mut text =
+        "# vtk DataFile Version 3.0\nBy rule, see examples/generate.rs; MIT OR Apache-2.0\nASCII\n".to_owned();
+    text += &format!("DATASET UNSTRUCTURED_GRID\nPOINTS {} float\n", points.len());
+    points.iter().for_each(|p| text += &point(p));
+    text += &format!("CELLS {} {numbers}\n", cells.len());
+    cells.iter().for_each(|c| text += &cell(c));
+    text += &format!("CELL_TYPES {}\n", cells.len());
+    cells.iter().for_each(|(kind, _)| text += &format!("{kind}\n"));
+    text.into_bytes()
+}
+
+/// A ring around the casting's boss, tilted so that it goes through the arm.
+fn ring() -> Vec<u8> {
+    let at = |t: f64| {
+        let (y, x) = (t * std::f64::consts::TAU).sin_cos();
+        [28.0 * x, 28.0 * y, 15.0 - 9.0 * x]
+    };
+    tube(at, 96, 14, 2.6, true)
+}
+
+/// A spring in the casting's bore, standing out above it.
+fn spring() -> Vec<u8> {
+    let at = |t: f64| {
+        let (y, x) = (t * 8.0 * std::f64::consts::TAU).sin_cos();
+        [5.6 * x, 5.6 * y, -24.0 + 66.0 * t]
+    };
+    tube(at, 8 * 20, 8, 1.5, false)
+}
+
+/// A tube around a curve that is nowhere upright, in quadrilaterals with smooth normals.
+fn tube(curve: impl Fn(f64) -> [f64; 3], along: usize, around: usize, radius: f64, closed: bool) -> Vec<u8> {
+    let rings = if closed { along } else { along + 1 };
+    let mut text = "# By rule, see examples/generate.rs; MIT OR Apache-2.0\n".to_owned();
+    for i in 0..rings {
+        let t = i as f64 / along as f64;
+        let [middle, before, after] = [t, t - 1e-4, t + 1e-4].map(&curve);
+        let way = unit(std::array::from_fn(|k| after[k] - before[k]));
+        let side = unit(cross(way, [0.0, 0.0, 1.0]));
+        let up = cross(side, way);
+        for j in 0..around {
+            let (s, c) = (j as f64 / around as f64 * std::f64::consts::TAU).sin_cos();
+            let normal: [f64; 3] = std::array::from_fn(|k| c * side[k] + s * up[k]);
+            let [x, y, z]: [f64; 3] = std::array::from_fn(|k| middle[k] + radius * normal[k]);
+            text += &format!("v {x:.2} {y:.2} {z:.2}\nvn {:.2} {:.2} {:.2}\n", normal[0], normal[1], normal[2]);
+        }
+    }
+    let corner = |i: usize, j: usize| 1 + i % rings * around + j % around;
+    for (i, j) in (0..along).flat_map(|i| (0..around).map(move |j| (i, j))) {
+        let corners = [corner(i, j), corner(i + 1, j), corner(i + 1, j + 1), corner(i, j + 1)];
+        let corners: Vec<_> = corners.iter().map(|n| format!("{n}//{n}")).collect();
+        text += &format!("f {}\n", corners.join(" "));
+    }
+    text.into_bytes()
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+fn unit(a: [f64; 3]) -> [f64; 3] {
+    let length = (a[0] * a[0] + a[1] * a[1] + a[2] * a[2]).sqrt();
+    a.map(|v| v / length)
 }

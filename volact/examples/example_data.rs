@@ -13,5 +13,11 @@ fn main() -> io::Result<()> {
         fs::write(&path, example.nrrd())?;
         println!("{}: {:?} samples", path.display(), example.dims);
     }
+    for (name, made) in generate::FILES {
+        let path = folder.join(name);
+        fs::create_dir_all(path.parent().unwrap_or(&folder))?;
+        fs::write(&path, made())?;
+        println!("{}", path.display());
+    }
     Ok(())
 }

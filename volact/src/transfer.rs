@@ -23,7 +23,7 @@ use volact_core::{
 
 pub use mesh::{AutomaticMesh, MeshLookError, automatic_mesh};
 
-use sight::{Sight, fit, world_steps};
+use sight::{Sight, fit, fit_upright, world_steps};
 use statistics::{Background, Histogram, Statistics};
 
 /// How to show a volume of which nothing else is known.
@@ -74,6 +74,12 @@ impl Automatic {
     /// A picture over black of the subject from a view of one's own.
     pub fn frame_from(&self, view: View, width: usize, height: usize) -> FrameDesc {
         fit(&self.hull, &self.subject, view, width, height)
+    }
+
+    /// As [`frame_from`](Self::frame_from), where another direction than z is up in the world; without
+    /// a view, from where the subject is seen best.
+    pub fn frame_upright(&self, up: DVec3, view: Option<View>, width: usize, height: usize) -> FrameDesc {
+        fit_upright(&self.hull, &self.subject, [view, Some(self.view)], up, [width, height])
     }
 
     /// The volume as a shape that looks so.

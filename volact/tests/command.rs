@@ -297,6 +297,11 @@ fn bare_meshes_just_work() {
     let (text, plane) = draw(&["--view", "front", "--slice", "y=50%"]);
     assert!(text.contains("1 slice planes") && (whole / 2..whole).contains(&plane), "{plane} of {whole}\n{text}");
     assert_eq!(draw(&["--view", "front", "--slice", "y=7"]).1, 0);
+    let upright = |up: &str, view: &str| draw(&["--up", up, "--view", view]).1;
+    assert_eq!((upright("z", "front"), upright("-z", "front")), (whole, whole));
+    assert!(upright("y", "top").abs_diff(whole) < whole / 50, "{} of {whole}", upright("y", "top"));
+    let wrong = volact(folder.path(), &["render", "room.vtu", "--up", "w"]);
+    assert!(code(&wrong) == 2 && err(&wrong).contains("wanted x, y, z, -x, -y or -z"), "{}", err(&wrong));
     let wrong = volact(folder.path(), &["render", "room.vtu", "--attribute", "heta"]);
     assert!(code(&wrong) == 2 && err(&wrong).contains("did you mean \"heat\"?"), "{}", err(&wrong));
 }

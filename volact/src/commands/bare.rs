@@ -4,8 +4,11 @@ use std::{path::Path, sync::Arc};
 
 use anyhow::{Context as _, bail, ensure};
 use volact::{
-    Appearance, Data, FrameDesc, LoadOptions, LookupTable, MeshData, ParameterDecl, Registry, Shape, SliceStyle,
-    Sliced, Slices, View, Volume, VolumeTexture, config::Config, core::scene::Scene, transfer,
+    Appearance, Data, LoadOptions, LookupTable, MeshData, ParameterDecl, Registry, Shape, SliceStyle, Sliced, Slices,
+    Volume, VolumeTexture,
+    config::Config,
+    core::{glam::DVec3, scene::Scene},
+    transfer,
 };
 
 use super::{
@@ -18,28 +21,25 @@ use super::{
 /// Reads the data and chooses how to show them; what was chosen, in words.
 pub fn open(args: &Args, registry: &Registry, config: &Config) -> anyhow::Result<(Scene, Vec<String>)> {
     let Size([width, height]) = args.size.unwrap_or(Size(config.size));
+    let up = args.up.unwrap_or(DVec3::Z);
     let (shape, frame, notes) = match load(args, registry)? {
         Data::Volume(volume) => {
             ensure!(args.attribute.is_none(), "--attribute is for meshes; {} holds a volume", args.input.display());
             let automatic = transfer::automatic(&volume);
             let (shape, notes) = volume_shape(args, &volume, &automatic, registry);
-            (shape, framed(args.view, automatic.view, |view| automatic.frame_from(view, width, height)), notes)
+            (shape, automatic.frame_upright(up, args.view, width, height), notes)
         }
         Data::Mesh(data) => {
             let automatic = transfer::automatic_mesh(&data, args.attribute.as_deref())
                 .with_context(|| format!("{}: cannot be drawn", args.input.display()))?;
             let (shape, notes) = mesh_shape(args, &data, &automatic);
-            (shape, framed(args.view, automatic.view, |view| automatic.frame_from(view, width, height)), notes)
+            (shape, automatic.frame_upright(up, args.view, width, height), notes)
         }
     };
     change(args, &shape, registry)?;
     slice(args, &shape)?;
     let frame = frame.with_background(args.background.unwrap_or(config.background));
     Ok((Scene { shapes: vec![shape], frame, action: None }, notes))
-}
-
-fn framed(asked: Option<View>, suits: View, frame: impl Fn(View) -> FrameDesc) -> FrameDesc {
-    frame(asked.unwrap_or(suits))
 }
 
 fn load(args: &Args, registry: &Registry) -> anyhow::Result<Data> {

@@ -18,7 +18,7 @@ use super::{progress::Line, report::Report, source, source::Source};
     volact render head.nrrd --shader mip --view front --size 800x600 -o mip.png\n  \
     volact render scene.ron --set unit_distance=2 --set 'skin.lookup_table=WindowLevel(window: 400, level: 40, opacity: 0.1)'\n  \
     volact render scene.ron --action cpu --option classification=post --step 0.25 -o exact.exr\n  \
-    volact render room.vtu --attribute t --slice z=50% --slice x=1.5 --around-slices\n  \
+    volact render room.vtu --up y --attribute t --slice z=50% --slice x=1.5 --around-slices\n  \
     volact render part.stl --clip 'y>0'\n\
     Existing pictures are replaced; a picture appears whole or not at all. `volact describe` lists what names mean.")]
 pub struct Args {

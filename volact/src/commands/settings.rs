@@ -6,7 +6,7 @@ use anyhow::{Context as _, anyhow, bail};
 use volact::{
     Options, View,
     config::Config,
-    core::{names, scene::ParameterSpec},
+    core::{glam::DVec3, names, scene::ParameterSpec},
 };
 
 /// Columns and rows of a picture: `640x480`, or `512` for a square.
@@ -33,6 +33,13 @@ fn wanted(found: &str, wanted: &str) -> String {
 pub fn view(name: &str) -> Result<View, String> {
     let known = View::ALL.map(|(name, _)| name);
     View::from_name(name).ok_or_else(|| format!("wanted one of {}{}", known.join(", "), names::hint(name, known)))
+}
+
+/// What is up: an axis, or against it.
+pub fn up(text: &str) -> Result<DVec3, String> {
+    let (sign, axis) = text.strip_prefix('-').map_or((1.0, text), |axis| (-1.0, axis));
+    let place = ["x", "y", "z"].iter().position(|name| *name == axis);
+    place.map(|axis| sign * DVec3::AXES[axis]).ok_or_else(|| wanted(text, "x, y, z, -x, -y or -z"))
 }
 
 /// A background: `r,g,b` or `r,g,b,a`, each 0 to 1, or `#rrggbb`; opaque unless told.

@@ -7,6 +7,7 @@ use volact::{
     Aabb, Frame, FrameDesc, Options, Registry, Shape, View,
     config::Config,
     core::{
+        glam::DVec3,
         scene::{CameraSpec, Folders, Scene, SceneFile},
         select::{self, Choice},
     },
@@ -32,6 +33,9 @@ pub struct Args {
     /// Look from: front, back, left, right, top, bottom or iso
     #[arg(long, value_name = "VIEW", value_parser = settings::view)]
     pub view: Option<View>,
+    /// What is up in bare data: x, y, z, -x, -y or -z [default: z]
+    #[arg(long, value_name = "AXIS", value_parser = settings::up, allow_hyphen_values = true)]
+    pub up: Option<DVec3>,
     /// Distance between samples in world units (the action's option `sample_distance`)
     #[arg(long, value_name = "DISTANCE")]
     pub step: Option<f64>,
@@ -164,10 +168,10 @@ impl Args {
     }
 
     fn scene(&self, registry: &Registry, config: &Config) -> anyhow::Result<Scene> {
-        let bare = self.shader.is_some() || self.attribute.is_some() || !self.slice.is_empty();
+        let bare = self.up.is_some() || self.shader.is_some() || self.attribute.is_some() || !self.slice.is_empty();
         if bare || self.loader.is_some() || !self.load.is_empty() {
             bail!(
-                "--shader, --attribute, --slice, --loader and --load are for bare data; a scene says these things itself"
+                "--up, --shader, --attribute, --slice, --loader and --load are for bare data; a scene says these things itself"
             );
         }
         let cannot = || format!("{}: cannot be drawn", self.input.display());

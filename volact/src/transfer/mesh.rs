@@ -19,7 +19,7 @@ use volact_core::{
 use super::{
     palette::Palette,
     short,
-    sight::{along, around, fit, thin_axis},
+    sight::{along, around, fit, fit_upright, thin_axis},
 };
 
 /// Mean optical depth of all lines that meet the mesh.
@@ -106,6 +106,12 @@ impl AutomaticMesh {
     /// A picture over black from a view of one's own.
     pub fn frame_from(&self, view: View, width: usize, height: usize) -> FrameDesc {
         fit(&self.hull, &self.subject, view, width, height)
+    }
+
+    /// As [`frame_from`](Self::frame_from), where another direction than z is up in the world; without
+    /// a view, from where the mesh is seen best.
+    pub fn frame_upright(&self, up: DVec3, view: Option<View>, width: usize, height: usize) -> FrameDesc {
+        fit_upright(&self.hull, &self.subject, [view, Some(self.view)], up, [width, height])
     }
 
     /// The mesh as a shape that looks so.

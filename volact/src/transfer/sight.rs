@@ -1,6 +1,12 @@
 //! From where a volume is seen, and what of it a camera should fit.
 
-use volact_core::{Aabb, Camera, FrameDesc, View, Volume, VolumeTexture, glam::DVec3, shape::smallest_voxel};
+use std::f64::consts::PI;
+
+use volact_core::{
+    Aabb, Camera, FrameDesc, View, Volume, VolumeTexture,
+    glam::{DQuat, DVec3},
+    shape::smallest_voxel,
+};
 
 use super::statistics::Statistics;
 
@@ -47,6 +53,36 @@ impl Sight {
 pub(super) fn fit(hull: &[DVec3], bounds: &Aabb, view: View, width: usize, height: usize) -> FrameDesc {
     let camera = Camera::fit_points(hull, view, width, height);
     FrameDesc::new(camera.unwrap_or_else(|| Camera::fit(bounds, view, width, height)), width, height)
+}
+
+/// As [`fit`], where another direction than z is up: all is turned until that is z, and the camera
+/// turned back. Unless a view is asked for, it is the one that suits, turned as well.
+pub(super) fn fit_upright(
+    hull: &[DVec3],
+    bounds: &Aabb,
+    [asked, suits]: [Option<View>; 2],
+    up: DVec3,
+    [width, height]: [usize; 2],
+) -> FrameDesc {
+    let turn = upright(up);
+    let turned = |points: &[DVec3]| points.iter().map(|p| turn * *p).collect::<Vec<_>>();
+    let view = asked.unwrap_or_else(|| match suits.unwrap_or_default() {
+        View::Iso => View::Iso,
+        view => along(turn * view.axes().0),
+    });
+    let mut frame = fit(&turned(hull), &around(&turned(&bounds.corners())), view, width, height);
+    if let Camera::LookAt { eye, target, up, .. } = &mut frame.camera {
+        let back = turn.inverse();
+        [eye, target, up].into_iter().for_each(|v| *v = back * *v);
+    }
+    frame
+}
+
+/// The shortest turn of a direction up to z; what is upside down is turned about y, so that its
+/// front stays in front.
+fn upright(up: DVec3) -> DQuat {
+    let up = up.normalize_or(DVec3::Z);
+    if up.z < -1.0 + 1e-9 { DQuat::from_rotation_y(PI) } else { DQuat::from_rotation_arc(up, DVec3::Z) }
 }
 
 /// The axis along which something of that size is thin, if it is flat.
@@ -136,4 +172,45 @@ pub(super) fn world_steps(volume: &Volume) -> [DVec3; 3] {
     let desc = volume.desc();
     let axes = [DVec3::X, DVec3::Y, DVec3::Z];
     std::array::from_fn(|a| desc.placement.transform_vector3(axes[a] * desc.spacing[a]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The column and row, 0 to 1, at which a point stands in a picture.
+    fn place(frame: &FrameDesc, point: DVec3) -> [f64; 2] {
+        let Camera::LookAt { eye, target, up, .. } = frame.camera else { panic!() };
+        let forward = (target - eye).normalize();
+        let right = forward.cross(up).normalize();
+        let (p, half) = (point - eye, 15f64.to_radians().tan());
+        let [x, y] = [right, right.cross(forward)].map(|axis| p.dot(axis) / p.dot(forward) / half);
+        [0.5 + x / 2.0, 0.5 - y / 2.0]
+    }
+
+    #[test]
+    fn what_is_said_to_be_up_is_up_and_all_is_seen() {
+        let room = Aabb::new(DVec3::ZERO, DVec3::new(6.0, 2.5, 2.4));
+        let hull = room.corners();
+        for up in [DVec3::X, DVec3::Y, DVec3::Z, -DVec3::X, -DVec3::Y, -DVec3::Z] {
+            for view in [View::Front, View::Left, View::Iso] {
+                let frame = fit_upright(&hull, &room, [Some(view), None], up, [64, 64]);
+                frame.validate().unwrap();
+                let [low, high] = [-1.0, 1.0].map(|side| place(&frame, room.center() + side * up));
+                assert!((low[0] - high[0]).abs() < 0.05 && high[1] < low[1] - 0.1, "{up} {view:?}: {low:?} {high:?}");
+                let inside = |p: &DVec3| place(&frame, *p).iter().all(|at| (0.0..=1.0).contains(at));
+                assert!(hull.iter().all(inside), "{up} {view:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn with_z_up_nothing_changes_and_a_view_that_suits_is_turned() {
+        let plate = Aabb::new(DVec3::ZERO, DVec3::new(4.0, 3.0, 0.5));
+        let hull = plate.corners();
+        let upright = |up, suits| fit_upright(&hull, &plate, [None, Some(suits)], up, [80, 60]).camera;
+        assert_eq!(upright(DVec3::Z, View::Top), fit(&hull, &plate, View::Top, 80, 60).camera);
+        let Camera::LookAt { eye, target, .. } = upright(DVec3::Y, View::Top) else { panic!() };
+        assert!((eye - target).normalize().z > 0.999);
+    }
 }
