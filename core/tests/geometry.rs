@@ -9,8 +9,8 @@ use std::sync::{
 use glam::DVec3;
 use proptest::prelude::*;
 use volact_core::{
-    Attribute, Block, Buffer, Bulk, CellType, CellTypes, Geometry, Mesh, Points, ScalarType, SliceStyle, Sliced,
-    Slices, StructuredMesh, Surface, Tessellation,
+    Appearance, Attribute, Block, Buffer, Bulk, CellType, CellTypes, Geometry, Mesh, Points, ScalarType, Shape,
+    SliceStyle, Sliced, Slices, StructuredMesh, Surface, Tessellation,
     geometry::{Adjacency, GeometryError, MeshReport},
 };
 
@@ -237,6 +237,8 @@ fn damaged_meshes_are_refused_by_name() {
     assert!(Surface::new(points(3), Buffer::from_vec(vec![0u32, 1, 3])).is_err());
     assert!(Surface::new(points(3), Buffer::from_vec(Vec::<u32>::new())).is_err());
     let surface = Surface::new(points(3), Buffer::from_vec(vec![0u32, 1, 2])).unwrap();
+    let shape = Shape::new(surface.clone(), Appearance::new("surface"));
+    assert!(shape.notes().is_empty(), "a surface needs no unit distance: {:?}", shape.notes());
     assert!(surface.tessellate().unwrap_err().to_string().contains("surface"));
     let none = Slices { planes: Vec::new(), style: SliceStyle::Opaque, volume: false };
     assert!(Sliced::new(Arc::new(surface), none).is_err());
