@@ -261,11 +261,13 @@ impl<'a, S: Simd> Window<'a, S> {
         crossings: &mut u64,
     ) -> u32 {
         let mut done = 0;
+        // Lanes in whose interval nothing has been taken yet.
+        let mut fresh = live;
         // SAFETY: the caller's promises.
         unsafe {
             loop {
                 let [from, to] = [S::max(depth[0], self.from), S::min(depth[1], self.to)];
-                let some = S::lt_bits(from, to) & live & !done;
+                let some = S::lt_bits(from, to) & fresh & !done;
                 if some != 0 {
                     let by = S::div(S::sub(number[1], number[0]), S::sub(depth[1], depth[0]));
                     let at = |d: S::F| S::fma(S::sub(d, depth[0]), by, number[0]);
@@ -296,6 +298,7 @@ impl<'a, S: Simd> Window<'a, S> {
                     along.start(live & !done, number[1]);
                     return done;
                 }
+                fresh = again;
             }
         }
     }

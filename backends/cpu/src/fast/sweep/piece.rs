@@ -81,7 +81,7 @@ impl Piece {
 }
 
 /// The mean of −ln(1 − a) where a runs linearly between two opacities; infinite where both are 1.
-fn mean_log([a, b]: [f64; 2]) -> f64 {
+pub fn mean_log([a, b]: [f64; 2]) -> f64 {
     if a >= 1.0 && b >= 1.0 {
         return f64::INFINITY;
     }
@@ -182,9 +182,32 @@ impl Sight {
             [one] => alone(&one.within([start, end]), depth),
             _ => mixed(pieces, [start, end]),
         };
-        let place = |needed: f64| start + (end - start) * (needed / depth).clamp(0.0, 1.0);
-        self.add([color[0], color[1], color[2], alpha], place);
+        self.add([color[0], color[1], color[2], alpha], |needed| find(pieces, [start, end], depth, needed));
     }
+}
+
+/// Where on a stretch an optical depth is reached, of `whole` over all of it: by Newton's steps,
+/// and where one leaves what is known, by halves.
+fn find(pieces: &[Piece], [start, end]: [f64; 2], whole: f64, needed: f64) -> f64 {
+    let length = end - start;
+    let (mut low, mut high, mut at) = (0.0, 1.0, (needed / whole).clamp(0.0, 1.0));
+    for _ in 0..60 {
+        let t = start + length * at;
+        let over = pieces.iter().map(|p| p.within([start, t]).depth()).sum::<f64>() - needed;
+        if over < 0.0 {
+            low = at
+        } else {
+            high = at
+        }
+        let slope = length * pieces.iter().map(|p| p.within([t, t]).sigma(0)).sum::<f64>();
+        let next = at - over / slope;
+        // Where extinction is infinite, a step of nothing tells nothing.
+        if (next - at).abs() < 1e-12 && slope.is_finite() || high - low < 1e-12 {
+            break;
+        }
+        at = if next > low && next < high { next } else { 0.5 * (low + high) };
+    }
+    start + length * at
 }
 
 /// Nodes and weights of Gauss and Legendre over 0 to 1.
