@@ -9,6 +9,8 @@ mod scenes;
 
 #[path = "fast/agreement.rs"]
 mod agreement;
+#[path = "fast/depths.rs"]
+mod depths;
 #[path = "fast/life.rs"]
 mod life;
 #[path = "fast/speed.rs"]

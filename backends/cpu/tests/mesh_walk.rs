@@ -332,6 +332,39 @@ fn pictures_are_those_of_tetrahedra_cut_by_planes() {
     assert!(mean < 3e-5, "root mean square error {mean:.2e}, worst {worst:.2e} of {count}");
 }
 
+/// Clips leave several intervals, which end in different lanes at different places.
+#[test]
+fn lengths_in_several_intervals_are_those_of_tetrahedra_cut_by_planes() {
+    for (name, mesh) in nasty().into_iter().filter(|(name, _)| ["regular", "holed", "tiny"].contains(name)) {
+        let (linked, all) = (linked(&mesh), bounds(&mesh));
+        let numbers = vec![0.0; mesh.vertices.len()];
+        let camera = cameras(&mesh, 3).swap_remove(0);
+        let grid = camera.rays(&VIEWPORT).unwrap();
+        let reach = all.size().length();
+        let shot = Shot::new(&linked, &numbers, &DAffine3::IDENTITY, &all, (&grid.linear(), SIZE), 1).unwrap();
+        packets(|pixel, active| {
+            let rays = rays(&grid, pixel);
+            // Three intervals a ray; every fifth ray has two, and every seventh none.
+            let from = 1.7 * reach - 0.6 * reach;
+            let ends = |l: usize, i: usize| [0.0, 0.3].map(|e| from + reach * (0.4 * i as f64 + e + 0.01 * l as f64));
+            let lanes =
+                |i: usize| (0..LANES).filter(|l| l % 7 != 3 && (i < 2 || l % 5 != 1)).fold(0, |m, l| m | 1 << l);
+            let spans: Vec<Span> = (0..3)
+                .map(|i| {
+                    let [start, end] = [0, 1].map(|e| std::array::from_fn(|l| ends(l, i)[e]));
+                    Span { start, end, active: active & lanes(i) }
+                })
+                .collect();
+            let (found, drawn) = shot.lengths(Unit::detect(), pixel, &spans);
+            for (l, ray) in rays.iter().enumerate().filter(|(l, _)| drawn.left >> l & 1 == 0) {
+                let inside = (0..3).filter(|&i| spans[i].active >> l & 1 == 1).map(|i| ends(l, i));
+                let wanted: f64 = inside.map(|e| length(&brute(&mesh, ray.origin, ray.direction, e))).sum();
+                assert!((found[l] - wanted).abs() < 2e-5 * reach, "{name} {pixel:?} {l}: {} {wanted}", found[l]);
+            }
+        });
+    }
+}
+
 #[test]
 fn wider_units_give_the_same_bits() {
     if Unit::detect() != Unit::Avx512 {
