@@ -365,6 +365,56 @@ fn lengths_in_several_intervals_are_those_of_tetrahedra_cut_by_planes() {
     }
 }
 
+/// Numbers that pass several control points within a cell of some optical depth: what tables say of
+/// the colour's course within it does not do there.
+#[test]
+fn coarse_cells_are_those_of_tetrahedra_cut_by_planes() {
+    let point = |&[value, hue, opacity]: &[f64; 3]| {
+        let color = [hue, 1.0 - hue, (3.0 * hue).fract()];
+        ControlPoint { value, color, opacity }
+    };
+    let waves: Vec<_> =
+        (0..24).map(|i| [f64::from(i) / 23.0, f64::from(i % 3) / 2.0, 0.3 + 0.2 * f64::from(i % 2)]).collect();
+    let tables: [&[[f64; 3]]; 5] = [
+        &[[0.0, 0.1, 0.0], [0.35, 0.3, 0.02], [0.5, 0.9, 0.4], [0.62, 0.1, 0.1], [1.0, 1.0, 0.7]],
+        // Even extinction, so that the colour alone bends: up and down around its mean.
+        &[[0.0, 0.5, 0.3], [0.4, 0.0, 0.3], [0.6, 1.0, 0.3], [1.0, 0.5, 0.3]],
+        &[[0.0, 0.5, 0.3], [0.48, 0.5, 0.3], [0.49, 0.0, 0.3], [0.51, 1.0, 0.3], [0.52, 0.5, 0.3], [1.0, 0.5, 0.3]],
+        &[[0.0, 0.0, 0.0], [1.0, 1.0, 0.9]],
+        &waves,
+    ];
+    let mesh = grid([3, 3, 2], |p| p + 0.1 * DVec3::new((3.0 * p.y).sin(), p.z * p.x, p.y * p.y)).tessellate().unwrap();
+    let linked = linked(&mesh);
+    let values: Vec<f64> = mesh.vertices.iter().map(|p| (0.1 + 0.3 * p.x + 0.15 * p.y + 0.35 * p.z).fract()).collect();
+    for (i, points) in tables.iter().enumerate() {
+        let points: Vec<_> = points.iter().map(point).collect();
+        let lut = LookupTable::from_points(points).unwrap().resolve([0.0, 1.0]);
+        for unit in [3.0, 0.3, 0.1, 0.03, 0.01] {
+            let table = Table::new(Look::new(&lut, None, unit), [0.0, 1.0], 0.5, bounds(&mesh).size().length());
+            // All of it in f64: what is left is the rounding of positions and numbers.
+            let mut exact = table.clone();
+            exact.entries.iter_mut().for_each(|e| e[1] = f32::NAN);
+            let (mut worst, mut rounding) = (0f64, 0f64);
+            for camera in cameras(&mesh, 11).into_iter().take(3) {
+                let scene = Scene { linked: &linked, mesh: &mesh, values: &values, table: &table, camera };
+                let picture = scene.draw(Unit::detect(), 0.0);
+                let scene = Scene { table: &exact, ..scene };
+                let slow = scene.draw(Unit::detect(), 0.0);
+                for (at, (found, slow)) in picture.color.iter().zip(&slow.color).enumerate() {
+                    let (light, _) = scene.brute((at % SIZE[0]) as f64, (at / SIZE[0]) as f64);
+                    let [r, g, b] = light.color;
+                    let wanted = [r, g, b, 1.0 - light.left].map(|v| v as f32);
+                    let far = |a: &[f32; 4], b: &[f32; 4]| (0..4).map(|k| (a[k] - b[k]).abs()).fold(0.0, f32::max);
+                    worst = worst.max(f64::from(far(found, slow)));
+                    rounding = rounding.max(f64::from(far(slow, &wanted)));
+                }
+            }
+            println!("table {i}, unit {unit}: {worst:.1e}, rounding {rounding:.1e}");
+            assert!(worst < 3e-5 && rounding < 1e-5, "table {i}, unit {unit}: {worst:.1e}, rounding {rounding:.1e}");
+        }
+    }
+}
+
 #[test]
 fn wider_units_give_the_same_bits() {
     if Unit::detect() != Unit::Avx512 {

@@ -13,12 +13,12 @@ use super::{
     },
     exact::Light,
     project::Slopes,
-    table::{Entry, Table},
+    table::{BENT, Entry, Table},
     walk::Along,
 };
 
 /// How wrong what a stretch adds may be.
-const WRONG: f32 = 1e-4;
+const WRONG: f32 = 5e-5;
 
 /// What is common to all packets.
 #[derive(Clone, Copy, Debug)]
@@ -155,6 +155,31 @@ impl<'a, S: Simd> Colours<'a, S> {
         }
     }
 
+    /// Lanes in which the same bounds for the stretch itself are too large, too. See
+    /// [`bend`](super::bend); ends are off by up to half of what changes between their two nodes.
+    #[inline(never)]
+    unsafe fn bent(&self, lanes: u32, number: [S::F; 2], [tau, by, left]: [S::F; 3]) -> u32 {
+        let (mut numbers, mut each) = ([[0f32; LANES]; 2], [[0f32; LANES]; 3]);
+        // SAFETY: the caller's promises.
+        unsafe {
+            (0..2).for_each(|i| S::store(number[i], &mut numbers[i]));
+            S::store(tau, &mut each[0]);
+            S::store(by, &mut each[1]);
+            S::store(left, &mut each[2]);
+        }
+        let table = self.job.table;
+        let is_bent = |l: &usize| {
+            let numbers = numbers.map(|n| n[*l]);
+            let [tau, by, left] = each.map(|v| v[*l]);
+            let [a, b] = numbers.map(|n| table.step(n));
+            let bend = table.bends.at(numbers) + (a[1] + b[1]) / 24.0;
+            let past = (-tau).exp();
+            let depth = by * (past * (a[0] + b[0]) / 8.0 + table.rounding * (1.0 - past) / tau.max(1e-6));
+            left * (tau * tau.min(1.0) * bend + depth) > BENT
+        };
+        (0..LANES).filter(|l| lanes >> l & 1 == 1).filter(is_bent).fold(0, |bent, l| bent | 1 << l)
+    }
+
     /// Integrates lanes exactly.
     #[inline(never)]
     unsafe fn exactly(&mut self, lanes: u32, depth: [S::F; 2], number: [S::F; 2], before: S::F) {
@@ -267,6 +292,21 @@ impl<S: Simd> Along<S> for Colours<'_, S> {
                 off = S::max(off, magnitude::<S>(S::sub(light[c], S::mul(tau, middle))));
             }
             rough |= S::lt_bits(S::splat(WRONG), S::mul(S::mul(off, tau), left)) & lanes;
+            // What the mean does not tell, by bounds for the whole table first: how much the colour
+            // may bend, and what extinction and colour taken even between two nodes may cost.
+            let table = self.job.table;
+            let by = S::select(small, S::splat(0.0), magnitude::<S>(by));
+            let weight = S::mul(tau, S::min(tau, S::splat(1.0)));
+            let most = S::min(S::mul(magnitude::<S>(change), S::splat(table.bends.steep)), S::splat(table.bends.most));
+            let most = S::fma(
+                weight,
+                S::add(most, S::splat(table.steps[1] / 12.0)),
+                S::mul(by, S::splat(table.steps[0] / 4.0 + table.rounding)),
+            );
+            let bent = S::lt_bits(S::splat(BENT), S::mul(most, left)) & lanes & !rough;
+            if bent != 0 {
+                rough |= self.bent(bent, number, [tau, by, left]);
+            }
             let plain = lanes & !rough;
             let tau = S::max(S::select(plain, tau, S::splat(0.0)), S::splat(0.0));
             let [alpha, ratio] = absorbed::<S>(tau);

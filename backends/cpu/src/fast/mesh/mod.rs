@@ -3,9 +3,11 @@
 //! - [`build`]: tetrahedra linked face to face, once for each mesh.
 //! - [`project`], [`entries`]: vertices and the way in, for each camera.
 //! - [`walk`], [`face`]: sixteen rays from cell to cell; [`shot`] puts these together.
-//! - [`numbers`], [`table`], [`integrate`], [`exact`]: what a stretch of a ray inside a cell adds.
+//! - [`numbers`], [`table`], [`bend`], [`integrate`], [`exact`]: what a stretch of a ray inside a
+//!   cell adds.
 //! - [`trace`]: one ray in f64, for what the vector kernels do not do.
 
+pub mod bend;
 pub mod build;
 pub mod entries;
 pub mod exact;

@@ -10,13 +10,16 @@
 //! numbers) are *rough*: their S is NaN at any number inside, and who meets it integrates exactly
 //! instead.
 
-use super::exact::Look;
+use super::{bend::Bends, exact::Look};
 
 /// Intervals over the numbers that differ in looks.
 const NODES: usize = 4096;
 
 /// How wrong extinction, as a part of itself, and colour may be between two nodes.
 const ROUGH: f64 = 1e-4;
+
+/// How wrong the light of a stretch may be because its colour is not linear in optical depth.
+pub const BENT: f32 = 1.5e-5;
 
 /// Abscissae on 0 to 1 and weights of Gauss's rule with four points.
 const GAUSS: [[f64; 2]; 4] = [
@@ -42,6 +45,12 @@ pub struct Table {
     pub nodes: Vec<[f32; 4]>,
     /// Opaque intervals before each interval and after all; empty where there is none.
     pub opaque: Vec<u32>,
+    /// How far from linear colours are.
+    pub bends: Bends,
+    /// The most that extinction and a colour change over an interval that is not rough.
+    pub steps: [f32; 2],
+    /// What rounding to f32 may take from a difference of S or Q.
+    pub rounding: f32,
     /// The same, exactly.
     pub look: Look,
 }
@@ -73,9 +82,16 @@ impl Table {
             let [r, g, b, a] = look.classify(value(i));
             [sigma(a, look.unit()), r, g, b].map(|v| v as f32)
         };
-        let nodes = (0..NODES + 3).map(node).collect();
+        let nodes: Vec<_> = (0..NODES + 3).map(node).collect();
+        let smooth = (0..NODES + 2).filter(|&i| !intervals[i].rough).map(|i| change(&nodes, i));
+        let steps = smooth.fold([0f32; 2], |[a, b], [s, c]| [a.max(s), b.max(c)]);
         let opaque = count_opaque(&intervals);
-        Self { first, scale: step.recip(), entries: sum(&intervals, center), nodes, opaque, look }
+        let known: Vec<_> = intervals.iter().map(|i| (i.sums, i.color)).collect();
+        let bends = Bends::new(&known, diagonal, f64::from(BENT));
+        let entries = sum(&intervals, center);
+        let most = entries.iter().map(|e| e[0].abs()).fold(0.0, f32::max);
+        let rounding = most * f32::EPSILON;
+        Self { first, scale: step.recip(), entries, nodes, opaque, bends, steps, rounding, look }
     }
 
     /// A number as the walk carries it: counted in intervals.
@@ -92,9 +108,17 @@ impl Table {
         self.first + f64::from(number) / self.scale
     }
 
+    /// What extinction and colour change over the interval of a number, as it is carried.
+    pub fn step(&self, number: f32) -> [f32; 2] {
+        change(&self.nodes, (number.max(0.0) as usize).min(self.nodes.len() - 2))
+    }
+
     /// Bytes held.
     pub fn bytes(&self) -> usize {
-        size_of_val(self.entries.as_slice()) + size_of_val(self.nodes.as_slice()) + 4 * self.opaque.len()
+        size_of_val(self.entries.as_slice())
+            + size_of_val(self.nodes.as_slice())
+            + 4 * self.opaque.len()
+            + self.bends.bytes()
     }
 }
 
@@ -113,6 +137,12 @@ fn sum(intervals: &[Interval], center: usize) -> Vec<Entry> {
         (0..4).for_each(|c| sums[c] += interval.sums[c]);
     }
     entries
+}
+
+/// What extinction changes over an interval, and the colour that changes most.
+fn change(nodes: &[[f32; 4]], i: usize) -> [f32; 2] {
+    let [a, b] = [nodes[i], nodes[i + 1]];
+    [(b[0] - a[0]).abs(), (1..4).map(|c| (b[c] - a[c]).abs()).fold(0.0, f32::max)]
 }
 
 fn count_opaque(intervals: &[Interval]) -> Vec<u32> {
