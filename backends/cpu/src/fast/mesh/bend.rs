@@ -56,8 +56,8 @@ impl Bends {
                     let depth = diagonal * (sums[end][0] - sums[start][0]) / (end - start) as f64;
                     if depth * depth.min(1.0) * bend > wrong {
                         // One that begins a block is near what ends the block before, too.
-                        for at in (start.saturating_sub(1) / block)..=start / block {
-                            worst[at] = worst[at].max(bend as f32);
+                        for worst in &mut worst[start.saturating_sub(1) / block..=start / block] {
+                            *worst = worst.max(bend as f32);
                         }
                     }
                 }

@@ -18,7 +18,7 @@ use super::{
 };
 
 /// How wrong what a stretch adds may be.
-const WRONG: f32 = 5e-5;
+const WRONG: f32 = 1e-4;
 
 /// What is common to all packets.
 #[derive(Clone, Copy, Debug)]

@@ -49,7 +49,7 @@ pub struct Table {
     pub bends: Bends,
     /// The most that extinction and a colour change over an interval that is not rough.
     pub steps: [f32; 2],
-    /// What rounding to f32 may take from a difference of S or Q.
+    /// What rounding to f32 takes from a difference of S or Q, as a rule at most.
     pub rounding: f32,
     /// The same, exactly.
     pub look: Look,
@@ -90,7 +90,8 @@ impl Table {
         let bends = Bends::new(&known, diagonal, f64::from(BENT));
         let entries = sum(&intervals, center);
         let most = entries.iter().map(|e| e[0].abs()).fold(0.0, f32::max);
-        let rounding = most * f32::EPSILON;
+        // Each of both is off by half a unit in its last place at most, and by a quarter as a rule.
+        let rounding = most * 0.5 * f32::EPSILON;
         Self { first, scale: step.recip(), entries, nodes, opaque, bends, steps, rounding, look }
     }
 
