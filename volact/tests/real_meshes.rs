@@ -11,7 +11,7 @@ use std::path::PathBuf;
 use volact::{
     Options, Registry, RegistryExt,
     core::{
-        Appearance, Camera, ControlPoint, Frame, FrameDesc, LookupTable, MeshData, Shape,
+        Appearance, Attribute, Camera, ControlPoint, Frame, FrameDesc, LookupTable, MeshData, Shape,
         glam::{DAffine3, DVec3},
     },
 };
@@ -36,11 +36,8 @@ fn meshes(registry: &Registry) -> Vec<(&'static str, MeshData)> {
 
 /// A faint ramp, and a table with a spike, a step and an opaque end; over parts of a range.
 fn tables([low, high]: [f64; 2]) -> [LookupTable; 2] {
-    let point = |part: f64, color: [f64; 3], opacity: f64| ControlPoint {
-        value: low + part * (high - low),
-        color,
-        opacity,
-    };
+    let point =
+        |part: f64, color: [f64; 3], opacity: f64| ControlPoint { value: low + part * (high - low), color, opacity };
     let (blue, green, red) = ([0.1, 0.2, 1.0], [0.2, 1.0, 0.3], [1.0, 0.3, 0.1]);
     let faint = [point(0.0, blue, 0.0), point(0.4, green, 0.3), point(1.0, red, 0.8)];
     let hard = [
@@ -53,6 +50,13 @@ fn tables([low, high]: [f64; 2]) -> [LookupTable; 2] {
         point(0.9, red, 1.0),
     ];
     [LookupTable::from_points(faint), LookupTable::from_points(hard)].map(Result::unwrap)
+}
+
+/// The range of nine tenths of the numbers.
+fn common(scalars: &Attribute) -> [f64; 2] {
+    let mut all: Vec<f64> = (0..scalars.len()).map(|v| scalars.value(v, 0)).filter(|v| !v.is_nan()).collect();
+    all.sort_by(f64::total_cmp);
+    [all[all.len() / 20], all[all.len() - 1 - all.len() / 20]]
 }
 
 /// From outside, from within at a wide angle, along an axis (along faces of cells), and askew from
@@ -83,7 +87,7 @@ fn real_meshes_look_as_in_the_reference() {
     let registry = Registry::with_builtins();
     for (name, data) in meshes(&registry) {
         let scalars = data.attributes.iter().find(|a| a.components == 1).unwrap_or(&data.attributes[0]);
-        let range = scalars.range(0).unwrap();
+        let range = common(scalars);
         let unit = data.geometry.bounds().size().length() / 10.0;
         for (table, look) in tables(range).into_iter().enumerate() {
             let appearance = Appearance::new("attribute")
