@@ -32,6 +32,9 @@ pub struct AttributeError {
 }
 
 impl Attribute {
+    /// The largest number that counts: products of two have to be finite.
+    pub const LARGEST: f64 = 1e150;
+
     /// Numbers of a type, so many a vertex.
     ///
     /// # Errors
@@ -65,13 +68,14 @@ impl Attribute {
         self.len() == 0
     }
 
-    /// The number of a component at a vertex; NaN where there is none.
+    /// The number of a component at a vertex; NaN where there is none, and for what nothing can be
+    /// interpolated with: infinities and numbers beyond ±[`LARGEST`](Self::LARGEST).
     pub fn value(&self, vertex: usize, component: usize) -> f64 {
-        if component < self.components && vertex < self.len() {
-            self.scalar.read(self.data.bytes(), vertex * self.components + component)
-        } else {
-            f64::NAN
+        if component >= self.components || vertex >= self.len() {
+            return f64::NAN;
         }
+        let value = self.scalar.read(self.data.bytes(), vertex * self.components + component);
+        if value.abs() <= Self::LARGEST { value } else { f64::NAN }
     }
 
     /// The lowest and highest finite number of a component; `None` where there is none.

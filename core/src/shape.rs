@@ -87,7 +87,7 @@ impl Shape {
     ///
     /// Without a `unit_distance`, the appearance gets the smallest voxel spacing of its volume in
     /// world units, or a hundredth of the diagonal of the geometry's bounds where it has none;
-    /// [`notes`](Self::notes) then says so. The shader `surface` has no use for one.
+    /// [`notes`](Self::notes) then says so, but for the shader `surface`, which has no use for one.
     pub fn new(geometry: impl Geometry, appearance: Appearance) -> Self {
         Self::build("shape", Arc::new(geometry), appearance, DAffine3::IDENTITY)
     }
@@ -128,11 +128,13 @@ impl Shape {
         let geometry_version = next_version();
         let mut state = ShapeState { geometry, geometry_version, shader, parameters, transform, clip: Clip::NONE };
         let mut notes = Vec::new();
-        // The shader of surfaces absorbs nothing over a length.
-        if !state.parameters.contains_key("unit_distance") && state.shader != "surface" {
+        if !state.parameters.contains_key("unit_distance") {
             let unit = default_unit_distance(&state);
-            let message = format!("no unit_distance given, {unit:?} world units taken");
-            notes.push(Warning::note(WarningCode::UnitDistanceDefaulted, &name, message));
+            // The shader of surfaces has no use for one, but may be switched for another.
+            if state.shader != "surface" {
+                let message = format!("no unit_distance given, {unit:?} world units taken");
+                notes.push(Warning::note(WarningCode::UnitDistanceDefaulted, &name, message));
+            }
             state.parameters.insert("unit_distance".into(), unit.into());
         }
         notes.iter().for_each(Warning::emit);

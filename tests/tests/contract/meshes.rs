@@ -7,8 +7,8 @@ use volact_conformance::{
     scene::{along_y, ball, colors, constant, greys, lut, one_ray, square},
 };
 use volact_core::{
-    Aabb, ActionError, Appearance, Block, Camera, FrameDesc, Geometry, LookupTable, Mesh, ScalarType, Shape,
-    Tessellation, VolumeTexture,
+    Aabb, ActionError, Appearance, Block, Camera, Clip, ClipRegion, FrameDesc, Geometry, LookupTable, Mesh, Plane,
+    ScalarType, Shape, Tessellation, VolumeTexture,
     geometry::GeometryError,
     glam::{DAffine3, DVec3},
 };
@@ -82,6 +82,66 @@ fn a_cube_looks_the_same_however_it_is_cut() {
         let fine = setup.colors(&[field(bent([4, 3, 5], DVec3::ONE, 0.1), linear, realistic(), 0.2)], &iso(24));
         let tolerance = if name == "cpu" { 2e-5 } else { 4.0 * tolerance };
         within(&format!("{name}, bent grid"), max_error(&six, &fine), tolerance);
+    }
+}
+
+/// Tetrahedra over each other in one mesh: the corner of edge 4 twice, and smaller ones inside and
+/// behind it, seen whole, cut by a plane inside, and until rays end.
+#[test]
+fn cells_over_each_other_count_each() {
+    let corner =
+        |at: DVec3, size: f64| [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z].map(|axis| (at + axis * size) * 0.25);
+    let corners =
+        [(0.0, 4.0), (0.0, 4.0), (0.3, 1.5), (0.9, 0.8), (1.2, 2.0)].map(|(at, size)| corner(DVec3::splat(at), size));
+    let cells: Vec<[u32; 4]> = (0..corners.len() as u32).map(|i| [0, 1, 2, 3].map(|v| 4 * i + v)).collect();
+    let linear = |p: DVec3| 0.3 + 0.2 * p.x + 0.3 * p.y + 0.25 * p.z;
+    let faint = colors(&[(0.0, [0.2, 0.4, 0.9], 0.02), (1.0, [1.0, 0.5, 0.2], 0.5)]);
+    for (table, termination) in [(faint.clone(), 0.0), (faint, 0.3), (realistic(), 0.0), (realistic(), 0.001)] {
+        let shape = field(tetrahedra(corners.concat(), &cells), linear, table, 0.2);
+        let cut = Plane::new(DVec3::splat(0.21), DVec3::new(0.3, 1.0, 0.2)).unwrap();
+        let kept = Clip::new([ClipRegion::plane(cut)]);
+        for clip in [Clip::NONE, kept, Clip::new([ClipRegion::plane(cut).cut()])] {
+            let desc = iso(24).with_clip(clip);
+            let wanted = Setup::exact().colors(std::slice::from_ref(&shape), &desc);
+            assert!(wanted.iter().any(|c| c[3] > 0.2));
+            let setup = Setup::cpu().with("termination", termination);
+            let found = setup.colors(std::slice::from_ref(&shape), &desc);
+            within("cpu", max_error(&found, &wanted), 3e-5 + termination);
+        }
+    }
+}
+
+/// Opaque over any interval of positive length where opacity is 1: also where numbers only touch
+/// it because they are all the same, alone and beside others.
+#[test]
+fn a_constant_that_is_opaque_is_opaque() {
+    let table = colors(&[(0.0, [0.0, 0.2, 1.0], 0.0), (1.0, [1.0, 0.5, 0.25], 1.0)]);
+    let ones = || field(cube(24), |_| 1.0, table.clone(), 0.7);
+    let fog = lut(&constant(1.0, [1, 1, 1]), greys(&[(1.0, 0.5, 0.2)]), 1.0);
+    for (name, setup, tolerance) in actions() {
+        for shapes in [vec![ones()], vec![ones(), ones()], vec![ones(), fog.clone()]] {
+            let found = setup.colors(&shapes, &iso(24));
+            let covered = found.iter().filter(|c| c[3] > 0.0);
+            let wanted = [1.0, 0.5, 0.25, 1.0];
+            let off = covered.clone().flat_map(|c| (0..4).map(|i| (c[i] - wanted[i]).abs())).fold(0.0, f64::max);
+            assert!(covered.count() > 100);
+            within(&format!("{name}, {} shapes", shapes.len()), off, tolerance);
+        }
+    }
+}
+
+#[test]
+fn an_infinite_scalar_makes_its_cells_transparent() {
+    for value in [f64::INFINITY, f64::NEG_INFINITY, 1e300] {
+        let odd = move |p: DVec3| if p == DVec3::ONE { value } else { p.x };
+        let unknown = move |p: DVec3| if p == DVec3::ONE { f64::NAN } else { p.x };
+        for (name, setup, tolerance) in actions() {
+            let draw = |rule: &dyn Fn(DVec3) -> f64| {
+                let shape = field(cube(5), rule, realistic(), 0.2);
+                setup.colors(&[shape], &iso(16))
+            };
+            within(&format!("{name}, {value}"), max_error(&draw(&odd), &draw(&unknown)), tolerance);
+        }
     }
 }
 

@@ -254,6 +254,12 @@ impl Hits {
         self.list[self.at[lane] as usize].door
     }
 
+    /// Whether a lane's next way begins before a depth.
+    pub fn begins_before(&self, lane: usize, depth: f32) -> bool {
+        let next = self.at[lane] + 1;
+        next < self.end[lane] && self.list[next as usize].depth < depth
+    }
+
     /// Goes on to the next way of a lane; returns the depth at which it begins.
     pub fn advance(&mut self, lane: usize) -> Option<f32> {
         self.at[lane] += 1;

@@ -102,7 +102,8 @@ unsafe fn tied<S: Simd>(ties: u32, a: &Corner<S>, b: &Corner<S>) -> u32 {
     (0..LANES).filter(|l| ties >> l & 1 == 1).fold(0, |bits, l| bits | u32::from(side(l)) << l)
 }
 
-/// Depth and number where rays meet triangles; `edge_on` where a triangle is seen so.
+/// Depth and number where rays meet triangles; `edge_on` where a triangle is seen so. Numbers are
+/// never outside of the corners', so that they are the same wherever those are.
 ///
 /// # Safety
 /// As above.
@@ -116,6 +117,10 @@ pub unsafe fn meet<S: Simd>([a, b, c]: &[Corner<S>; 3], edge_on: [S::F; 2]) -> [
         let some = S::lt_bits(S::splat(0.0), sum);
         let depth = S::mul(weigh::<S>(weights, [a.z, b.z, c.z]), by);
         let number = S::mul(weigh::<S>(weights, [a.number, b.number, c.number]), by);
+        // In this order a NaN stays one.
+        let low = S::min(S::min(a.number, b.number), c.number);
+        let high = S::max(S::max(a.number, b.number), c.number);
+        let number = S::min(high, S::max(low, number));
         [S::select(some, depth, edge_on[0]), S::select(some, number, edge_on[1])]
     }
 }

@@ -40,10 +40,16 @@ impl Crossing {
         [0, 1, 2, 3].map(|i| a[i] * (1.0 - part) + b[i] * part)
     }
 
-    /// A number of the vertices at both ends.
+    /// A number of the vertices at both ends; never outside of theirs, so that it is the same
+    /// wherever theirs are.
     pub fn interpolate(&self, value: impl Fn(usize) -> f64) -> [f64; 2] {
         let values = self.vertices.map(|v| value(v as usize));
-        self.weights.map(|w| (0..4).map(|i| w[i] * values[i]).sum())
+        let low = values.into_iter().fold(f64::INFINITY, f64::min);
+        let high = values.into_iter().fold(f64::NEG_INFINITY, f64::max);
+        self.weights.map(|w| {
+            let sum: f64 = (0..4).map(|i| w[i] * values[i]).sum();
+            if sum.is_nan() { sum } else { sum.max(low).min(high) }
+        })
     }
 
     /// The part between two places; `None` where it has no length.

@@ -102,6 +102,7 @@ pub unsafe fn walk<S: Simd, A: Along<S>>(
             let before = [front.depth, front.number];
             let ended = front.step(cells, &beside, live);
             let (depth, number) = ([before[0], front.depth], [before[1], front.number]);
+            let was = live;
             let outside = S::lt_bits(before[0], window.from) | S::lt_bits(window.to, front.depth);
             if outside & live == 0 {
                 tally.crossings += u64::from(live.count_ones());
@@ -110,6 +111,9 @@ pub unsafe fn walk<S: Simd, A: Along<S>>(
                 live &= !window.cut(along, live, depth, number, &mut tally.crossings);
             }
             steps -= 1;
+            if was & !live != 0 {
+                tally.overlap |= front.passes_others(was & !live, hits);
+            }
             if ended & live != 0 {
                 live = front.leave(cells, &beside, live, ended & live, hits, &mut tally.overlap);
                 along.start(live & ended, front.number);
@@ -185,6 +189,17 @@ impl<S: Simd> Front<S> {
             self.number = number;
             ended
         }
+    }
+
+    /// Lanes that are done while they are past the beginning of another way: ways overlap there.
+    #[cold]
+    #[inline(never)]
+    unsafe fn passes_others(&self, lanes: u32, hits: &Hits) -> u32 {
+        let mut depth = [0f32; LANES];
+        // SAFETY: the caller's promises.
+        unsafe { S::store(self.depth, &mut depth) };
+        let past = |l: usize| hits.begins_before(l, depth[l] - ROUNDING * hits.reach);
+        (0..LANES).filter(|l| lanes >> l & 1 == 1 && past(*l)).fold(0, |bits, l| bits | 1 << l)
     }
 
     /// Takes lanes that have left the mesh to where they enter it again; returns the live lanes.

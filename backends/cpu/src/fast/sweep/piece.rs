@@ -6,6 +6,10 @@ use volact_core::table::ResolvedTable;
 const PART: f64 = 0.25;
 /// Halvings at most.
 const HALVINGS: u32 = 40;
+/// What is behind less than this left to see is not looked at.
+const UNSEEN: f64 = 1e-13;
+/// How many times as much transparency a smooth part may have at one end as at the other.
+const SMOOTH: f64 = 1.1;
 
 /// A part of a ray through one shape: opacity and straight colour linear in `t`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -165,12 +169,16 @@ impl Sight {
     fn uneven(&mut self, pieces: &[Piece], [start, end]: [f64; 2], halvings: u32) {
         let parts = |t: [f64; 2]| pieces.iter().map(move |p| p.within(t));
         let depth: f64 = parts([start, end]).map(|p| p.depth()).sum();
-        if depth <= 0.0 {
+        if depth <= 0.0 || self.left() < UNSEEN {
             return;
         }
-        // Near an opacity of 1 extinction has a logarithm's pole: only short parts are smooth.
-        let highest = parts([start, end]).flat_map(|p| p.opacity).fold(0.0, f64::max);
-        let smooth = depth <= PART && (highest < 0.97 || depth < 1e-5 || pieces.len() == 1);
+        // Near an opacity of 1 extinction has a logarithm's pole: only parts over which
+        // transparency hardly changes are smooth.
+        let steep = |p: Piece| {
+            let [a, b] = p.opacity.map(|a| 1.0 - a);
+            a.max(b) > SMOOTH * a.min(b) && a.min(b) < 0.03
+        };
+        let smooth = depth <= PART && (pieces.len() == 1 || depth < 1e-5 || !parts([start, end]).any(steep));
         let middle = 0.5 * (start + end);
         if !smooth && halvings > 0 && start < middle && middle < end {
             self.uneven(pieces, [start, middle], halvings - 1);
@@ -287,7 +295,9 @@ impl Run<'_> {
         let (from_value, to_value) = (points[after - 1].value, points[after].value);
         [from, to].map(|part| {
             let s = ((at(part) - from_value) / (to_value - from_value)).clamp(0.0, 1.0);
-            [0, 1, 2, 3].map(|c| low[c] * (1.0 - s) + high[c] * s)
+            // Exact at both ends, and where both are the same.
+            let mix = |a: f64, b: f64| if s < 0.5 { a + s * (b - a) } else { b - (1.0 - s) * (b - a) };
+            [0, 1, 2, 3].map(|c| mix(low[c], high[c]))
         })
     }
 }
