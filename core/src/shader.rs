@@ -1,7 +1,8 @@
 //! Shaders: what turns a sample into colour and extinction, known by name.
 //!
-//! A [`ShaderEntry`] is the declaration and how the shader's samples are put together. Its source
-//! is not needed here: an action asks for the shaders that it knows by name.
+//! A [`ShaderEntry`] is the declaration, how the shader's samples are put together, and its source
+//! where it has one. The source is plain text here: whoever runs it reads it (`volact-shaders`).
+//! An action without that asks for the shaders that it knows by name.
 
 use std::{collections::BTreeMap, sync::Arc};
 
@@ -28,6 +29,9 @@ pub enum Compositing {
 }
 
 impl Compositing {
+    /// All of them.
+    pub const ALL: [Self; 6] = [Self::Over, Self::Maximum, Self::Minimum, Self::Average, Self::Add, Self::First];
+
     /// The word for it.
     pub fn name(self) -> &'static str {
         match self {
@@ -41,6 +45,15 @@ impl Compositing {
     }
 }
 
+/// A shader's WGSL.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ShaderText {
+    /// The file that it came from, as messages name it.
+    pub file: String,
+    /// The text.
+    pub text: String,
+}
+
 /// A registered shader.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ShaderEntry {
@@ -48,6 +61,8 @@ pub struct ShaderEntry {
     pub declaration: Declaration,
     /// How its samples are put together.
     pub compositing: Compositing,
+    /// Its source; `None` for one that only native code draws.
+    pub source: Option<Arc<ShaderText>>,
 }
 
 /// All shaders known, by name. Shared by reference.
@@ -121,6 +136,7 @@ pub fn builtin() -> Vec<ShaderEntry> {
     let entry = |name: &str, compositing, text: &str, parameters: Vec<ParameterDecl>| ShaderEntry {
         declaration: Declaration { parameters, ..Declaration::new(Kind::Shader, name, version, text) },
         compositing,
+        source: None,
     };
     let grey = "from value to colour and opacity; by default an opaque grey ramp over the volume's range";
     let flat =

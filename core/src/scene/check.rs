@@ -213,7 +213,7 @@ fn fits(value: &ParameterSpec, decl: &ParameterDecl) -> Result<(), (String, Stri
 }
 
 /// Three or four numbers are a colour where a colour is wanted.
-pub(super) fn coerce(value: &ParameterValue, decl: &ParameterDecl) -> ParameterValue {
+pub(crate) fn coerce(value: &ParameterValue, decl: &ParameterDecl) -> ParameterValue {
     let takes = |kind| decl.types.contains(&kind);
     match value {
         ParameterValue::Vec3(v) if takes(ParameterType::Color) && !takes(ParameterType::Vec3) => {

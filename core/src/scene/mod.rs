@@ -65,8 +65,9 @@ pub use problem::{Problem, Problems, Spot};
 pub use reader::MAX_NAME;
 
 pub(crate) use build::read_text;
+pub(crate) use check::coerce;
 pub(crate) use document::parse as parse_document;
-pub(crate) use parameters::plain_parameters;
+pub(crate) use parameters::{plain_parameters, value as plain_value};
 pub(crate) use view::{background, size, view};
 
 /// The version of the scene format that this build reads.

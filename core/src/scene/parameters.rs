@@ -45,7 +45,8 @@ pub(super) fn head<'a>(at: &At<'a>) -> &'a str {
 
 const VALUES: [&str; 7] = ["Volume", "Table", "Entries", "WindowLevel", "Attribute", "Color", "Matrix"];
 
-fn value(reader: &mut Reader, at: &At) -> Option<ParameterValue> {
+/// One value that needs no file.
+pub(crate) fn value(reader: &mut Reader, at: &At) -> Option<ParameterValue> {
     Some(match &at.node.kind {
         Kind::Bool(v) => ParameterValue::Bool(*v),
         Kind::Text(word) => ParameterValue::Choice(word.clone()),
