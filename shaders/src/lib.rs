@@ -1,0 +1,26 @@
+//! Shaders: their sources, what is checked of them, and their evaluation on the CPU.
+//!
+//! A shader is `name.ron`, its declaration, and `name.wgsl`, in which each declared parameter is a
+//! function of its own name. The author writes `fn shade(s: Sample) -> Medium`; `docs/shaders.md`
+//! is the reference. This crate
+//!
+//! 1. reads both files ([`load`], [`load_folder`]) into a [`ShaderEntry`](volact_core::ShaderEntry),
+//! 2. checks the text ([`Program`]): what is wrong is shown with the author's file, line and caret,
+//! 3. compiles a function of it, with the uniform parameters of a shape, into a [`Kernel`],
+//! 4. evaluates that over batches of samples ([`Machine`]), in `f32` or `f64`.
+//!
+//! What the functions of volumes, tables and attributes give is asked of an [`Environment`]: that
+//! is the action's part.
+
+pub mod error;
+pub mod eval;
+mod program;
+mod refuse;
+pub mod signatures;
+mod source;
+mod tokens;
+
+pub use error::{ShaderError, SourceError, SourceErrors};
+pub use eval::{Environment, Kernel, Machine};
+pub use program::{Entry, Program};
+pub use source::{load, load_folder};
