@@ -90,8 +90,10 @@ impl fmt::Debug for Watch {
 /// What an action can do.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Caps {
-    /// Names of the shaders that it draws; `None` for any.
+    /// Names of the shaders that it draws without their source; `None` for any.
     pub shaders: Option<Vec<String>>,
+    /// Whether it draws other shaders by their source.
+    pub sources: bool,
     /// Names of the geometries that it draws; `None` for any that tessellates.
     pub geometries: Option<Vec<String>>,
     /// The ways of compositing that it draws.
@@ -181,6 +183,14 @@ pub enum ActionError {
         shape: String,
         /// Why.
         source: GeometryError,
+    },
+    /// A shader's source is wrong, or fails on some sample.
+    #[error("shape {shape:?}")]
+    Shader {
+        /// The shape's name.
+        shape: String,
+        /// Why.
+        source: Box<dyn std::error::Error + Send + Sync>,
     },
     /// The action cannot do what the scene asks.
     #[error("action {action:?} cannot draw shape {shape:?}: {what}; {cure}")]

@@ -83,6 +83,12 @@ impl ResolvedShape {
         }
     }
 
+    /// The first volume that the shader declares and the shape has: with the geometry it says
+    /// where the shape is.
+    pub fn first_volume(&self) -> Option<&VolumeTexture> {
+        self.shader.declaration.parameters.iter().find_map(|p| self.volume(&p.name))
+    }
+
     /// A table parameter.
     pub fn table(&self, name: &str) -> Option<&LookupTable> {
         match self.parameters.get(name) {
@@ -112,11 +118,11 @@ impl ResolvedShape {
         }
     }
 
-    /// The box to draw in object space: the geometry's block ∩ the volume's geometry ROI; `None`
+    /// The box to draw in object space: the geometry's block ∩ the first volume's geometry ROI; `None`
     /// where the geometry is no block.
     pub fn block(&self) -> Option<Aabb> {
         let block = self.state.geometry.as_block()?;
-        Some(self.volume("volume").map_or(block, |v| block.intersection(&v.geometry_roi())))
+        Some(self.first_volume().map_or(block, |v| block.intersection(&v.geometry_roi())))
     }
 
     /// The world box around what [`block`](Self::block) holds, or around the geometry's bounds.

@@ -101,7 +101,8 @@ fn attempt(
 pub fn can_draw(caps: &Caps, shapes: &[ResolvedShape]) -> Result<(), String> {
     for shape in shapes {
         let geometry = shape.state.geometry.name();
-        if caps.shaders.as_ref().is_some_and(|known| !known.contains(&shape.state.shader)) {
+        let source = caps.sources && shape.shader.source.is_some();
+        if !source && caps.shaders.as_ref().is_some_and(|known| !known.contains(&shape.state.shader)) {
             return Err(format!("does not draw shader {:?} (shape {:?})", shape.state.shader, shape.name));
         }
         if caps.geometries.as_ref().is_some_and(|known| !known.iter().any(|g| g == geometry)) {

@@ -265,7 +265,9 @@ fn transform_steps_apply_in_order() {
     let mut scene = SceneFile::parse(text).unwrap();
     let mut registry = Registry::with_core();
     let declaration = volact_core::Declaration::new(volact_core::parameter::Kind::Shader, "none", "1", "nothing");
-    registry.add_shader(volact_core::ShaderEntry { declaration, compositing: volact_core::Compositing::Over, source: None }).unwrap();
+    registry
+        .add_shader(volact_core::ShaderEntry { declaration, compositing: volact_core::Compositing::Over, source: None })
+        .unwrap();
     let built: Scene = scene.build(&registry, Path::new(""), &NoProgress).unwrap();
     let transform: DAffine3 = built.shapes[0].state().transform;
     assert!((transform.transform_point3(DVec3::ZERO) - DVec3::new(0.0, 2.0, 0.0)).length() < 1e-12);

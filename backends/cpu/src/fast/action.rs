@@ -139,7 +139,9 @@ impl RenderAction for CpuAction {
         self.last = (!drawn.is_empty()).then(|| plan.clone());
         let prepare = start.elapsed();
         let mut frame = Frame::empty(&open.desc);
-        let counts = Picture::new(&open, &drawn, &self.resources, &self.settings, &plan)?.draw(&mut frame);
+        let picture = Picture::new(&open, &drawn, &self.resources, &self.settings, &plan)?;
+        let counts = picture.draw(&mut frame);
+        picture.check()?;
         frame.warnings = drawn.iter().flat_map(|s| s.warnings.clone()).collect();
         if counts.rays == 0 && !drawn.is_empty() {
             let message = "no ray meets any shape; check camera, near and far, and transforms";

@@ -2,16 +2,18 @@
 
 use volact_core::{ActionError, Caps, Compositing, resolve::ResolvedShape};
 
-use super::options::Settings;
+use super::{options::Settings, shaded};
 
 /// The action's name.
 pub const NAME: &str = "cpu";
-const SHADERS: [&str; 8] = ["simple", "lut", "mip", "minip", "average", "xray", "attribute", "surface"];
+/// Shaders that kernels of their own draw.
+pub const SHADERS: [&str; 8] = ["simple", "lut", "mip", "minip", "average", "xray", "attribute", "surface"];
 
 /// What it can do.
 pub fn caps(settings: &Settings) -> Caps {
     Caps {
         shaders: Some(SHADERS.map(str::to_owned).to_vec()),
+        sources: true,
         geometries: None,
         compositing: vec![
             Compositing::Over,
@@ -36,6 +38,12 @@ pub fn check(shape: &ResolvedShape) -> Result<(), ActionError> {
         Err(ActionError::Unsupported { action: NAME.into(), shape: shape.name.clone(), what, cure: cure.into() })
     };
     let shader = shape.shader.declaration.name.as_str();
+    if shaded::wanted(shape) {
+        return match shaded::refused(shape) {
+            Some((what, cure)) => unsupported(what, cure),
+            None => Ok(()),
+        };
+    }
     if !SHADERS.contains(&shader) {
         return unsupported(format!("shader {shader:?}"), &format!("it draws {}", SHADERS.join(", ")));
     }

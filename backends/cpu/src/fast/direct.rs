@@ -267,7 +267,7 @@ fn absorbed(opacity: &[f32; LANES], length: f64) -> [f32; LANES] {
 
 /// The natural logarithm of a positive, normal number.
 #[inline(always)]
-fn ln(x: f64) -> f64 {
+pub fn ln(x: f64) -> f64 {
     // As a power of two times a number between √½ and √2.
     let shifted = x.to_bits().wrapping_sub(std::f64::consts::FRAC_1_SQRT_2.to_bits());
     let power = (shifted as i64) >> 52;
@@ -283,7 +283,7 @@ fn ln(x: f64) -> f64 {
 
 /// The exponential of a number between −700 and 0.
 #[inline(always)]
-fn exp(y: f64) -> f64 {
+pub fn exp(y: f64) -> f64 {
     // Adding 1.5·2⁵² rounds to whole numbers.
     const ROUND: f64 = 6_755_399_441_055_744.0;
     let n = y * std::f64::consts::LOG2_E + ROUND - ROUND;

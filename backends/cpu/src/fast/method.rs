@@ -7,11 +7,12 @@ use super::{
     options::{Classification, Settings},
     plan::Plan,
     resources::Resources,
+    shaded,
 };
 
 /// How the shapes drawn were made into a picture.
 pub fn method(drawn: &[&ResolvedShape], plan: &Plan, resources: &Resources, settings: &Settings) -> Method {
-    let voxels = drawn.iter().any(|s| s.volume("volume").is_some());
+    let voxels = drawn.iter().any(|s| s.first_volume().is_some() || shaded::wanted(s));
     let cells = drawn.iter().any(|s| s.attribute("scalars").is_some());
     let walls = drawn.iter().any(|s| s.state.geometry.as_surface().is_some());
     let sampling = [
@@ -26,13 +27,14 @@ pub fn method(drawn: &[&ResolvedShape], plan: &Plan, resources: &Resources, sett
         let pre_integrated = resources.tables(shape.id).is_some_and(|t| t.pre_integrated());
         let table = shape.table("lookup_table").map(LookupTable::interpolation);
         classification.push(match (shape.compositing(), table) {
+            _ if shaded::wanted(shape) => "shader evaluated in the middle of segments",
             _ if shape.attribute("scalars").is_some() => "linear in each cell",
             (Compositing::Over, Some(TableInterpolation::Pre)) => "pre-interpolated",
             (Compositing::Over, None) => "components",
             (Compositing::Over, _) if pre_integrated => "pre-integrated",
             _ => "post-interpolated",
         });
-        formats.extend(shape.volume("volume").map(|v| v.volume().desc().scalar.to_string()));
+        formats.extend(shape.first_volume().map(|v| v.volume().desc().scalar.to_string()));
         formats.extend(shape.attribute("scalars").map(|a| a.scalar.to_string()));
     }
     classification.dedup();

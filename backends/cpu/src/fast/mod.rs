@@ -36,6 +36,7 @@ pub mod plan;
 pub mod preintegrate;
 pub mod reduce;
 pub mod resources;
+pub mod shaded;
 pub mod sharp;
 pub mod shear;
 pub mod simd;

@@ -15,7 +15,7 @@ use super::{
     part::{Aimed, Content, Part, lane},
     simd::{LANES, Unit},
     sweep::{
-        self, Layer, Scene,
+        self, Layer, Look, Scene,
         piece::{Hit, Piece, Sight},
     },
     walk::Counts,
@@ -173,6 +173,7 @@ impl Over<'_> {
         let alone = |(part, aimed): &(&Part<'_>, Aimed)| match &part.content {
             Content::Voxels(_) => aimed.bent.is_none(),
             Content::Field(field) => field.seen.is_some(),
+            Content::Shaded(_) => false,
         };
         if !aimed.iter().all(alone) {
             return None;
@@ -219,6 +220,8 @@ impl Over<'_> {
             match &drawn.content {
                 Content::Voxels(job) => dispatch::draw(job, &packet.within(&span), pixels, counts),
                 Content::Field(_) => drop(self.walk(bundle, drawn, &[span], pixels, counts)),
+                // Without a kernel of its own it is never here: see `stretches`.
+                Content::Shaded(_) => {}
             }
             (0..LANES).for_each(|l| next[l] += (span.active >> l & 1) as usize);
         }
@@ -257,10 +260,14 @@ impl Over<'_> {
             active |= aimed.stretches.active();
             match &part.content {
                 Content::Voxels(job) => layers.push(Layer {
-                    job,
+                    look: Look::Voxels { job, bent: aimed.bent.as_deref() },
                     packet: &aimed.packet,
                     stretches: &aimed.stretches,
-                    bent: aimed.bent.as_deref(),
+                }),
+                Content::Shaded(shaded) => layers.push(Layer {
+                    look: Look::Shaded { shaded: shaded.as_ref(), bundle },
+                    packet: &aimed.packet,
+                    stretches: &aimed.stretches,
                 }),
                 Content::Field(field) => {
                     let rays = bundle.through(&part.region.place.to_object);

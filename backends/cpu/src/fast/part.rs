@@ -3,8 +3,8 @@
 use std::ops::ControlFlow;
 
 use volact_core::{
-    Aabb, Attribute, Clip, LookupTable, Plane, SliceStyle, camera::LinearRays, glam::DVec3, lattice::Lattice,
-    resolve::ResolvedShape, table::ResolvedTable,
+    Aabb, ActionError, Attribute, Clip, LookupTable, Plane, SliceStyle, camera::LinearRays, glam::DVec3,
+    lattice::Lattice, resolve::ResolvedShape, table::ResolvedTable,
 };
 
 use super::{
@@ -17,6 +17,7 @@ use super::{
     over,
     packet::{Bundle, Packet, Place, Span, Vectors},
     resources::{Prepared, Resources, voxels},
+    shaded::{self, Shaded},
     simd::{LANES, Unit},
     stretches::Stretches,
     sweep::piece::{Hit, Piece, Run, cut},
@@ -49,7 +50,7 @@ pub struct Aimed {
 impl<'a> Region<'a> {
     /// The region of a resolved shape; `None` where there is nothing of it.
     pub fn new(shape: &'a ResolvedShape, scene: &'a Clip, resources: &'a Resources) -> Option<Self> {
-        let texture = shape.volume("volume");
+        let texture = shape.first_volume();
         let mesh = match resources.prepared(shape) {
             Some(Prepared::Solid(solid)) => Some(solid),
             _ => None,
@@ -62,6 +63,7 @@ impl<'a> Region<'a> {
         let bounds = shape.state.geometry.bounds();
         let block = match (shape.state.geometry.as_block(), texture) {
             (Some(block), Some(texture)) if mesh.is_none() => block.intersection(&texture.geometry_roi()),
+            (Some(block), None) if mesh.is_none() => block,
             (_, Some(texture)) if bend.is_none() => grown(&bounds).intersection(&texture.geometry_roi()),
             _ => grown(&bounds),
         };
@@ -244,6 +246,8 @@ pub enum Content<'a> {
     Voxels(Box<over::Job<'a>>),
     /// Numbers at a mesh's vertices.
     Field(Box<Field<'a>>),
+    /// What a shader's program makes of places on the lattice.
+    Shaded(Box<Shaded<'a>>),
 }
 
 /// How a picture is looked at.
@@ -292,6 +296,10 @@ impl<'a> Part<'a> {
     ) -> Option<Self> {
         let mut region = Region::new(shape, scene, resources)?;
         let (content, medium) = match shape.volume("volume") {
+            _ if shaded::wanted(shape) => {
+                let shaded = Shaded::new(shape, resources.shader(shape.id)?, lattice.step, eyes.settings.unit);
+                (Content::Shaded(Box::new(shaded)), None)
+            }
             Some(texture) => {
                 let tables = resources.tables(shape.id)?;
                 let job = over::Job {
@@ -317,6 +325,17 @@ impl<'a> Part<'a> {
         let slices = shape.state.geometry.slices();
         let slicing = slices.map(|s| Slicing { planes: &s.planes, style: s.style, medium });
         Some(Self { id: shape.id, region, content, volume: slices.is_none_or(|s| s.volume), slicing })
+    }
+
+    /// The first failure of its program.
+    ///
+    /// # Errors
+    /// That.
+    pub fn check(&self) -> Result<(), ActionError> {
+        match &self.content {
+            Content::Shaded(shaded) => shaded.check(),
+            _ => Ok(()),
+        }
     }
 
     /// Whether it has planes.

@@ -121,6 +121,14 @@ impl<'a> Picture<'a> {
         }
     }
 
+    /// The first failure of a shader's program, if there was one.
+    ///
+    /// # Errors
+    /// That.
+    pub fn check(&self) -> Result<(), ActionError> {
+        self.over.parts.iter().try_for_each(Part::check)
+    }
+
     /// Draws sixteen rays; returns those that met something.
     fn packet(&self, bundle: &Bundle, pixels: &mut Pixels, counts: &mut Counts) -> u32 {
         let mut span = bundle.span;

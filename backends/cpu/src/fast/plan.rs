@@ -2,7 +2,7 @@
 
 use volact_core::{Aabb, ActionError, Compositing, resolve::ResolvedShape, shape::smallest_voxel};
 
-use super::{check::NAME, options::Settings};
+use super::{check::NAME, options::Settings, shaded};
 
 /// Most segments of the lattice along the diagonal of what is drawn.
 const MOST_SEGMENTS: f64 = 1e7;
@@ -33,7 +33,7 @@ impl Plan {
     /// If the step is too small for one of them.
     pub fn new(shapes: &[&ResolvedShape], settings: &Settings) -> Result<Self, ActionError> {
         let plan = Self::guess(shapes, settings);
-        for shape in shapes.iter().filter(|s| s.volume("volume").is_some()) {
+        for shape in shapes.iter().filter(|s| s.first_volume().is_some() || shaded::wanted(s)) {
             let size = shape.state.world_bounds().size().length();
             if size / plan.step > MOST_SEGMENTS {
                 return Err(ActionError::Limit {
@@ -49,7 +49,7 @@ impl Plan {
 }
 
 fn distance(shapes: &[&ResolvedShape], settings: &Settings) -> f64 {
-    let voxel = |s: &&ResolvedShape| s.volume("volume").map(|t| smallest_voxel(t, &s.state.transform));
+    let voxel = |s: &&ResolvedShape| s.first_volume().map(|t| smallest_voxel(t, &s.state.transform));
     let smallest = shapes.iter().filter_map(voxel).fold(f64::INFINITY, f64::min);
     settings.sample_distance.unwrap_or(if smallest.is_finite() { smallest / 2.0 } else { 1.0 })
 }

@@ -118,6 +118,7 @@ impl RenderAction for ReferenceAction {
         let values = [Compositing::Maximum, Compositing::Minimum, Compositing::Average, Compositing::Add];
         Caps {
             shaders: names(&["simple", "lut", "mip", "minip", "average", "xray", "attribute", "surface"]),
+            sources: false,
             geometries: None,
             compositing: [Compositing::Over, Compositing::First].into_iter().chain(values).collect(),
             overlap: true,

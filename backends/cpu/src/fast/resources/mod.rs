@@ -26,6 +26,7 @@ use super::{
     mesh::numbers::Numbers,
     options::{Classification, Settings},
     plan::Plan,
+    shaded::{self, Shader},
 };
 
 pub use solids::{Prepared, Solid};
@@ -57,6 +58,8 @@ pub struct Resources {
     geometries: BTreeMap<usize, Kept>,
     /// By shape.
     numbers: BTreeMap<u64, Numbers>,
+    /// By shape.
+    shaders: BTreeMap<u64, Shader>,
 }
 
 /// A geometry made ready. While it is kept, no other has its address.
@@ -80,6 +83,22 @@ pub fn component(shape: &ResolvedShape) -> usize {
         (None, Some(Components::Rgba)) => 3,
         _ => 0,
     }
+}
+
+/// The voxels of a texture's component as a program reads them, and their units.
+pub fn plain_voxels(texture: &VolumeTexture, component: usize) -> (Voxels<'_>, Units) {
+    let desc = texture.volume().desc();
+    let mut voxels = Voxels::new(texture, component);
+    let mut units = Units { scale: desc.slope, offset: desc.intercept };
+    if matches!(desc.scalar, ScalarType::F64 | ScalarType::U32 | ScalarType::I32) {
+        // f32 cannot hold these: fetch them relative to those that occur.
+        let [lo, hi] = texture.volume().value_range().unwrap_or([0.0, 1.0]);
+        let (a, b) = ((lo - desc.intercept) / desc.slope, (hi - desc.intercept) / desc.slope);
+        voxels.origin = a;
+        voxels.gain = if a == b { 1.0 } else { 1.0 / (b - a) };
+        units = Units { scale: desc.slope / voxels.gain, offset: lo };
+    }
+    (voxels, units)
 }
 
 /// The voxels that a shape reads, and their units.
@@ -151,6 +170,10 @@ impl Resources {
                 rebuilt.push(Rebuild { shape: shape.name.clone(), what: what.into(), bytes });
             };
             let bent = self.prepare_geometry(shape, progress, &mut say)?;
+            if shaded::wanted(shape) {
+                self.prepare_shader(shape, &mut say)?;
+                continue;
+            }
             let Some(texture) = shape.volume("volume") else {
                 self.prepare_numbers(shape, &mut say);
                 continue;
@@ -177,6 +200,7 @@ impl Resources {
         self.zeros.retain(|key, _| keys.contains(key));
         self.geometries.retain(|address, _| geometries.contains(address));
         self.numbers.retain(|id, _| ids.contains(id));
+        self.shaders.retain(|id, _| ids.contains(id));
     }
 
     /// Bytes held.
@@ -200,6 +224,11 @@ impl Resources {
     /// The numbers of a shape's vertices, where they have one table for colour and opacity.
     pub fn numbers(&self, id: u64) -> Option<&Numbers> {
         self.numbers.get(&id)
+    }
+
+    /// The program of a shape's shader, where that is evaluated.
+    pub fn shader(&self, id: u64) -> Option<&Shader> {
+        self.shaders.get(&id)
     }
 
     /// The geometry of a shape as it was made ready; `None` where it is a box.
@@ -260,6 +289,18 @@ impl Resources {
             }
             self.numbers.insert(shape.id, numbers);
         }
+    }
+
+    fn prepare_shader(&mut self, shape: &ResolvedShape, say: &mut impl FnMut(&str, usize)) -> Result<(), ActionError> {
+        let kept = self.shaders.remove(&shape.id);
+        if let Some(kept) = kept.filter(|kept| kept.serves(shape)) {
+            self.shaders.insert(shape.id, kept);
+            return Ok(());
+        }
+        let made = Shader::new(shape)?;
+        say("shader", made.bytes());
+        self.shaders.insert(shape.id, made);
+        Ok(())
     }
 
     fn prepare_volume(

@@ -13,6 +13,7 @@ use volact_core::{
 use crate::fast::{
     check::NAME,
     mesh::build::{Linked, MOST},
+    shaded,
     surface::Skin,
 };
 
@@ -65,7 +66,7 @@ pub fn whole(shape: &ResolvedShape) -> &Arc<dyn Geometry> {
 
 /// Whether a shape is drawn through its tetrahedra or triangles.
 pub fn wanted(shape: &ResolvedShape) -> bool {
-    shape.state.geometry.as_block().is_none() || shape.volume("volume").is_none()
+    shape.state.geometry.as_block().is_none() || shape.first_volume().is_none() && !shaded::wanted(shape)
 }
 
 /// Makes a geometry ready.

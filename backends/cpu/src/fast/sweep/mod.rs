@@ -15,27 +15,63 @@ use super::{
     bent::Bent,
     dispatch,
     over::{Job, Pixels, entries},
-    packet::{Cuts, Packet},
+    packet::{Bundle, Cuts, Packet},
     simd::{LANES, Unit},
     stretches::Stretches,
     walk::{ALL, CHUNK, Counts},
 };
-use gather::Chunk;
+use gather::{Chunk, Row};
 use lane::Lane;
 use merge::{Rows, Sights};
 use piece::{Hit, Piece, Sight};
 
-/// A shape's voxels along sixteen rays.
+/// A shape on the lattice along sixteen rays.
 #[derive(Clone, Copy, Debug)]
 pub struct Layer<'a> {
-    /// What its kernel needs.
-    pub job: &'a Job<'a>,
+    /// What is seen of it.
+    pub look: Look<'a>,
     /// The rays in sample space.
     pub packet: &'a Packet,
     /// Where they are inside.
     pub stretches: &'a Stretches,
-    /// The way through sample space, where it is not straight.
-    pub bent: Option<&'a Bent>,
+}
+
+/// What is seen of a shape.
+#[derive(Clone, Copy, Debug)]
+pub enum Look<'a> {
+    /// Voxels through a table.
+    Voxels {
+        /// What its kernel needs.
+        job: &'a Job<'a>,
+        /// The way through sample space, where it is not straight.
+        bent: Option<&'a Bent>,
+    },
+    /// What is evaluated in batches.
+    Shaded {
+        /// What evaluates.
+        shaded: &'a (dyn Batches + 'a),
+        /// The rays in world space.
+        bundle: &'a Bundle,
+    },
+}
+
+/// What gives segments' colour and opacity at places of the world, a batch at once.
+pub trait Batches: std::fmt::Debug {
+    /// What whole segments would add by what cut segments hold, and the lanes in which there is
+    /// one to take.
+    fn entries(&self, bundle: &Bundle, cut: &[[f64; 2]; LANES], done: u32, counts: &mut Counts) -> (Row, u32);
+
+    /// Gathers the whole segments of one stretch in the chunk that begins with segment `first`;
+    /// returns the next segment in which there may be something.
+    fn gather(
+        &self,
+        bundle: &Bundle,
+        cuts: &Cuts,
+        first: i64,
+        done: u32,
+        chunk: &mut Chunk,
+        counts: &mut Counts,
+    ) -> i64;
 }
 
 /// What sixteen rays meet.
@@ -138,15 +174,16 @@ impl<'a> Sweep<'a> {
 
     /// Cuts a layer's stretches by the lattice.
     fn cut(&mut self, layer: usize, counts: &mut Counts) {
-        let Layer { job, packet, stretches, bent } = self.scene.layers[layer];
+        let Layer { look, packet, stretches } = self.scene.layers[layer];
         for span in stretches.spans() {
             let packet = packet.within(span);
             let cuts = packet.split(self.scene.step);
             counts.lattice += cuts.count();
             for ends in [&cuts.front, &cuts.back] {
-                let (entries, wanted) = match bent {
-                    Some(bent) => bent.entries(job, ends, self.done, counts),
-                    None => entries(job, &packet, ends, self.done, counts),
+                let (entries, wanted) = match look {
+                    Look::Voxels { job, bent: Some(bent) } => bent.entries(job, ends, self.done, counts),
+                    Look::Voxels { job, bent: None } => entries(job, &packet, ends, self.done, counts),
+                    Look::Shaded { shaded, bundle } => shaded.entries(bundle, ends, self.done, counts),
                 };
                 for l in (0..LANES).filter(|l| wanted >> l & 1 == 1 && entries[*l][3] > 0.0) {
                     let k = (0.5 * (ends[l][0] + ends[l][1]) / self.scene.step).floor() as i64;
@@ -217,9 +254,12 @@ impl<'a> Sweep<'a> {
         for walk in self.walks.iter_mut().filter(|w| w.next < first + CHUNK as i64) {
             let layer = &self.scene.layers[walk.layer];
             let (chunk, at) = (&mut self.chunks[walk.layer], (&walk.packet, &walk.cuts));
-            walk.next = match layer.bent {
-                Some(bent) => bent.gather(layer.job, &walk.cuts, first, self.done, chunk, counts),
-                None => dispatch::gather(self.unit, layer.job, at, first, self.done, chunk, counts),
+            walk.next = match layer.look {
+                Look::Voxels { job, bent: Some(bent) } => bent.gather(job, &walk.cuts, first, self.done, chunk, counts),
+                Look::Voxels { job, bent: None } => {
+                    dispatch::gather(self.unit, job, at, first, self.done, chunk, counts)
+                }
+                Look::Shaded { shaded, bundle } => shaded.gather(bundle, &walk.cuts, first, self.done, chunk, counts),
             };
         }
     }
