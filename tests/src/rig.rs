@@ -80,6 +80,14 @@ impl Setup {
         self.try_action().unwrap_or_else(|e| panic!("{self:?}: {e}"))
     }
 
+    /// The action as another registry makes it, which knows other shaders.
+    ///
+    /// # Panics
+    /// If it cannot be made.
+    pub fn action_in(&self, registry: &Registry) -> Box<dyn RenderAction> {
+        registry.action(&self.name, &self.options).unwrap_or_else(|e| panic!("{self:?}: {e}"))
+    }
+
     /// One picture of shapes drawn in this order by a fresh action.
     ///
     /// # Panics

@@ -12,6 +12,7 @@ mod opacity;
 mod opaque;
 mod orders;
 mod overlaps;
+mod programs;
 mod properties;
 mod skipping;
 mod slices;
