@@ -241,7 +241,9 @@ fn validation_error(error: &naga::WithSpan<ValidationError>, start: usize) -> So
         cause = error.source();
     }
     // naga's labels name types of its own, which tell an author nothing.
-    let places = error.spans().filter_map(|(span, _)| Some((place(*span, start)?, String::new()))).take(1).collect();
+    // The narrowest place is where the trouble is; the others lie around it.
+    let places = error.spans().filter_map(|(span, _)| place(*span, start));
+    let places = places.min_by_key(Range::len).map(|range| (range, String::new())).into_iter().collect();
     let message = messages.pop().unwrap_or_default();
     SourceError { message, places, notes: messages }
 }
