@@ -12,14 +12,17 @@
 //! What the functions of volumes, tables and attributes give is asked of an [`Environment`]: that
 //! is the action's part.
 
+pub mod builtin;
 pub mod error;
 pub mod eval;
+pub mod plain;
 mod program;
 mod refuse;
 pub mod signatures;
 mod source;
 mod tokens;
 
+pub use builtin::{Native, builtin, recognise};
 pub use error::{ShaderError, SourceError, SourceErrors};
 pub use eval::{Environment, Kernel, Machine};
 pub use program::{Entry, Program};

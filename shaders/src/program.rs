@@ -7,10 +7,7 @@ use naga::{
     front::wgsl::ParseError,
     valid::{Capabilities, ModuleInfo, ValidationError, ValidationFlags, Validator},
 };
-use volact_core::{
-    Compositing, Declaration, ShaderEntry, ShaderFile, ShaderText,
-    scene::Problems,
-};
+use volact_core::{Compositing, Declaration, ShaderEntry, ShaderFile, ShaderText, scene::Problems};
 
 use crate::{
     error::{ShaderError, SourceError, SourceErrors},
@@ -140,9 +137,10 @@ pub(crate) fn check_declaration(file: &ShaderFile) -> Result<(), Problems> {
             let wanted = format!("another name: its function `{name}` is one of the parameter {other:?}, too");
             problems.push(file.name_problem(*i, wanted));
         } else if declaration.parameters[*i].name != *name {
-            problems.extend(refuse::bad_name(name).map(|_| {
-                file.name_problem(*i, format!("another name: its function `{name}` is a name of WGSL"))
-            }));
+            problems.extend(
+                refuse::bad_name(name)
+                    .map(|_| file.name_problem(*i, format!("another name: its function `{name}` is a name of WGSL"))),
+            );
         }
     }
     if problems.is_empty() { Ok(()) } else { Err(Problems::new(problems)) }
@@ -293,9 +291,8 @@ fn has_signature(module: &Module, function: &Function, entry: Entry) -> bool {
 }
 
 fn signature(module: &Module, function: &Function) -> String {
-    let argument = |a: &naga::FunctionArgument| {
-        format!("{}: {}", a.name.as_deref().unwrap_or("_"), type_name(module, a.ty))
-    };
+    let argument =
+        |a: &naga::FunctionArgument| format!("{}: {}", a.name.as_deref().unwrap_or("_"), type_name(module, a.ty));
     let arguments: Vec<_> = function.arguments.iter().map(argument).collect();
     let result = function.result.as_ref().map_or(String::new(), |r| format!(" -> {}", type_name(module, r.ty)));
     format!("fn {}({}){result}", function.name.as_deref().unwrap_or("_"), arguments.join(", "))

@@ -29,7 +29,10 @@ const REFUSED: &[(&[&str], &str)] = &[
     (&["dpdx", "dpdy", "fwidth"], "a sample has no neighbours on the screen"),
     (&["storageBarrier", "textureBarrier", "workgroupBarrier", "workgroupUniformLoad"], "samples share no memory"),
     (&["subgroup", "quadBroadcast", "quadSwap"], "samples share no group"),
-    (&["pack2x", "pack4x", "unpack2x", "unpack4x", "dot4I8", "dot4U8", "quantizeToF16"], "packed numbers are not supported"),
+    (
+        &["pack2x", "pack4x", "unpack2x", "unpack4x", "dot4I8", "dot4U8", "quantizeToF16"],
+        "packed numbers are not supported",
+    ),
     (&["arrayLength", "binding_array"], "arrays have a fixed length"),
     (&["RayDesc", "RayIntersection", "acceleration_structure", "ray_query", "rayQuery", "coop"], "not supported"),
 ];
@@ -101,7 +104,9 @@ fn attribute(text: &str, token: &Token, next: Option<&Token>) -> Option<SourceEr
 
 fn unsupported(token: &Token, word: &str) -> Option<SourceError> {
     let refused = |why: &str| Some(SourceError::at(token.range.clone(), format!("`{word}` is not for shaders: {why}")));
-    if let Some((_, why)) = REFUSED.iter().find(|(begin, _)| begin.iter().any(|b| word.starts_with(b)) && built_in(word)) {
+    if let Some((_, why)) =
+        REFUSED.iter().find(|(begin, _)| begin.iter().any(|b| word.starts_with(b)) && built_in(word))
+    {
         return refused(why);
     }
     let half = (word.starts_with("vec") || word.starts_with("mat")) && word.ends_with('h') && word.len() <= 7;
@@ -114,9 +119,9 @@ fn unsupported(token: &Token, word: &str) -> Option<SourceError> {
 /// Whether WGSL or naga has something of that name.
 pub fn built_in(word: &str) -> bool {
     let more = ["RayDesc", "RayIntersection", "acceleration_structure", "ray_query", "binding_array"];
-    let alias = word.strip_suffix(['f', 'i', 'u', 'h']).is_some_and(|stem| {
-        stem.len() <= 6 && (stem.starts_with("vec") || stem.starts_with("mat")) && built_in(stem)
-    });
+    let alias = word
+        .strip_suffix(['f', 'i', 'u', 'h'])
+        .is_some_and(|stem| stem.len() <= 6 && (stem.starts_with("vec") || stem.starts_with("mat")) && built_in(stem));
     naga::keywords::wgsl::BUILTIN_IDENTIFIERS.contains(&word)
         || more.contains(&word)
         || word.starts_with("rayQuery")

@@ -120,7 +120,14 @@ pub const SIGNATURES: &[Signature] = &[
         "the gradient of the value in data units per world unit, along the world's axes: central differences \
          over one voxel either way",
     ),
-    row(ParameterType::Volume, Derived::Nearest, "_nearest", P, "f32", "the value at the nearest sample, in data units"),
+    row(
+        ParameterType::Volume,
+        Derived::Nearest,
+        "_nearest",
+        P,
+        "f32",
+        "the value at the nearest sample, in data units",
+    ),
     row(
         ParameterType::Volume,
         Derived::Inside,

@@ -12,7 +12,11 @@ fn check(text: &str, samples: &[[f32; 6]], truth: impl Fn([f32; 6]) -> [f32; 4])
     let found = shade(&program, samples).unwrap();
     for (sample, found) in samples.iter().zip(found) {
         let wanted = truth(*sample);
-        assert_eq!(found.map(f32::to_bits), wanted.map(f32::to_bits), "{sample:?}: {found:?}, wanted {wanted:?}\n{text}");
+        assert_eq!(
+            found.map(f32::to_bits),
+            wanted.map(f32::to_bits),
+            "{sample:?}: {found:?}, wanted {wanted:?}\n{text}"
+        );
     }
 }
 
@@ -208,7 +212,8 @@ fn indices_stay_inside() {
 
 #[test]
 fn pointers_change_what_they_point_to() {
-    let text = "fn add(p: ptr<function, vec3<f32>>, x: f32) -> f32 { (*p).y += x; let old = (*p).x; (*p).x = x; return old; }
+    let text =
+        "fn add(p: ptr<function, vec3<f32>>, x: f32) -> f32 { (*p).y += x; let old = (*p).x; (*p).x = x; return old; }
     fn shade(s: Sample) -> Medium {
         var v = s.position;
         let before = v;
@@ -237,7 +242,8 @@ fn what_is_not_evaluated_has_no_effect() {
 
 #[test]
 fn a_loop_without_end_is_an_error_that_names_shader_and_budget() {
-    let text = "fn shade(s: Sample) -> Medium { var x = 0.0; loop { x += s.position.x; } return Medium(vec3(x), 0.0); }";
+    let text =
+        "fn shade(s: Sample) -> Medium { var x = 0.0; loop { x += s.position.x; } return Medium(vec3(x), 0.0); }";
     let Ok(endless) = program(text) else { panic!("accepted by naga") };
     let error = shade(&endless, &[[1f32; 6]; 3]).unwrap_err();
     assert_eq!(

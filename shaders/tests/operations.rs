@@ -64,17 +64,34 @@ floats![
     ["exp2(a)", |a, b, c| a.exp2()],
     ["log(a)", |a, b, c| a.ln()],
     ["log2(a)", |a, b, c| a.log2()],
-    ["sign(a)", |a, b, c| if a > 0.0 { 1.0 } else if a < 0.0 { -1.0 } else { a }],
-    ["saturate(a)", |a, b, c| { let x = if a < 0.0 { 0.0 } else { a }; if 1.0 < x { 1.0 } else { x } }],
+    ["sign(a)", |a, b, c| if a > 0.0 {
+        1.0
+    } else if a < 0.0 {
+        -1.0
+    } else {
+        a
+    }],
+    ["saturate(a)", |a, b, c| {
+        let x = if a < 0.0 { 0.0 } else { a };
+        if 1.0 < x { 1.0 } else { x }
+    }],
     ["min(a, b)", |a, b, c| if b < a { b } else { a }],
     ["max(a, b)", |a, b, c| if a < b { b } else { a }],
     ["pow(a, b)", |a, b, c| a.powf(b)],
     ["atan2(a, b)", |a, b, c| a.atan2(b)],
     ["step(a, b)", |a, b, c| if a <= b { 1.0 } else { 0.0 }],
-    ["clamp(a, b, c)", |a, b, c| { let x = if a < b { b } else { a }; if c < x { c } else { x } }],
+    ["clamp(a, b, c)", |a, b, c| {
+        let x = if a < b { b } else { a };
+        if c < x { c } else { x }
+    }],
     ["fma(a, b, c)", |a, b, c| a.mul_add(b, c)],
     ["mix(a, b, c)", |a, b, c| a * (1.0 - c) + b * c],
-    ["smoothstep(a, b, c)", |a, b, c| { let t = (c - a) / (b - a); let t = if t < 0.0 { 0.0 } else { t }; let t = if 1.0 < t { 1.0 } else { t }; t * t * (3.0 - 2.0 * t) }],
+    ["smoothstep(a, b, c)", |a, b, c| {
+        let t = (c - a) / (b - a);
+        let t = if t < 0.0 { 0.0 } else { t };
+        let t = if 1.0 < t { 1.0 } else { t };
+        t * t * (3.0 - 2.0 * t)
+    }],
     ["dot(vec3(a, b, c), vec3(b, c, a))", |a, b, c| a * b + b * c + c * a],
     ["length(vec2(a, b))", |a, b, c| (a * a + b * b).sqrt()],
     ["distance(vec2(a, b), vec2(c, a))", |a, b, c| ((a - c) * (a - c) + (b - a) * (b - a)).sqrt()],
@@ -84,7 +101,11 @@ floats![
     ["cross(vec3(a, b, c), vec3(c, a, b)).y", |a, b, c| c * c - a * b],
     ["reflect(vec2(a, b), vec2(c, a)).y", |a, b, c| b - 2.0 * (c * a + a * b) * a],
     ["faceForward(vec2(a, b), vec2(b, c), vec2(c, a)).x", |a, b, c| if b * c + c * a < 0.0 { a } else { -a }],
-    ["refract(vec2(a, b), vec2(b, c), 0.5).x", |a, b, c| { let d = b * a + c * b; let k = 1.0 - 0.5 * 0.5 * (1.0 - d * d); if k < 0.0 { 0.0 } else { 0.5 * a - (0.5 * d + k.sqrt()) * b } }],
+    ["refract(vec2(a, b), vec2(b, c), 0.5).x", |a, b, c| {
+        let d = b * a + c * b;
+        let k = 1.0 - 0.5 * 0.5 * (1.0 - d * d);
+        if k < 0.0 { 0.0 } else { 0.5 * a - (0.5 * d + k.sqrt()) * b }
+    }],
     ["(mat2x2(a, b, c, a) * vec2(b, c)).y", |a, b, c| b * b + a * c],
     ["(vec3(a, b, c) * mat2x3(a, b, c, c, b, a)).y", |a, b, c| a * c + b * b + c * a],
     ["(mat2x2(a, b, c, a) * mat2x2(b, c, a, b))[1][0]", |a, b, c| a * a + c * b],
@@ -129,7 +150,8 @@ fn evaluate<F: Real>(wgsl: &str, samples: &[Six]) -> Vec<F> {
 #[test]
 fn arithmetic_is_that_of_the_machine() {
     let numbers = [0.0, -0.0, 1.5, -2.5, 1e30, 1e-30, f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 3.0];
-    let samples: Vec<Six> = (0..1000).map(|i| [numbers[i % 10], numbers[i / 10 % 10], numbers[i / 100], 0.0, 0.0, 0.0]).collect();
+    let samples: Vec<Six> =
+        (0..1000).map(|i| [numbers[i % 10], numbers[i / 10 % 10], numbers[i / 100], 0.0, 0.0, 0.0]).collect();
     for (wgsl, single, double) in FLOATS {
         for (s, found) in samples.iter().zip(evaluate::<f32>(wgsl, &samples)) {
             let wanted = single(s[0] as f32, s[1] as f32, s[2] as f32);
@@ -145,50 +167,186 @@ fn arithmetic_is_that_of_the_machine() {
 type Integers = (&'static str, fn(i32, i32, u32, u32, u32) -> u32);
 
 const INTEGERS: &[Integers] = &[
-    ("u32(i + j)", |i, j, u, w, k| { _ = (i, j, u, w, k); i.wrapping_add(j) as u32 }),
-    ("u32(i - j)", |i, j, u, w, k| { _ = (i, j, u, w, k); i.wrapping_sub(j) as u32 }),
-    ("u32(i * j)", |i, j, u, w, k| { _ = (i, j, u, w, k); i.wrapping_mul(j) as u32 }),
-    ("u32(i / j)", |i, j, u, w, k| { _ = (i, j, u, w, k); i.checked_div(j).unwrap_or(i) as u32 }),
-    ("u32(i % j)", |i, j, u, w, k| { _ = (i, j, u, w, k); i.checked_rem(j).unwrap_or(0) as u32 }),
-    ("u / w", |i, j, u, w, k| { _ = (i, j, u, w, k); u.checked_div(w).unwrap_or(u) }),
-    ("u % w", |i, j, u, w, k| { _ = (i, j, u, w, k); u.checked_rem(w).unwrap_or(0) }),
-    ("u * w", |i, j, u, w, k| { _ = (i, j, u, w, k); u.wrapping_mul(w) }),
-    ("u - w", |i, j, u, w, k| { _ = (i, j, u, w, k); u.wrapping_sub(w) }),
-    ("u & w", |i, j, u, w, k| { _ = (i, j, u, w, k); u & w }),
-    ("u | w", |i, j, u, w, k| { _ = (i, j, u, w, k); u | w }),
-    ("u ^ w", |i, j, u, w, k| { _ = (i, j, u, w, k); u ^ w }),
-    ("~u", |i, j, u, w, k| { _ = (i, j, u, w, k); !u }),
-    ("u32(-i)", |i, j, u, w, k| { _ = (i, j, u, w, k); i.wrapping_neg() as u32 }),
-    ("u << k", |i, j, u, w, k| { _ = (i, j, u, w, k); u << (k % 32) }),
-    ("u >> k", |i, j, u, w, k| { _ = (i, j, u, w, k); u >> (k % 32) }),
-    ("u32(i >> k)", |i, j, u, w, k| { _ = (i, j, u, w, k); (i >> (k % 32)) as u32 }),
-    ("u32(min(i, j))", |i, j, u, w, k| { _ = (i, j, u, w, k); i.min(j) as u32 }),
-    ("u32(max(i, j))", |i, j, u, w, k| { _ = (i, j, u, w, k); i.max(j) as u32 }),
-    ("min(u, w)", |i, j, u, w, k| { _ = (i, j, u, w, k); u.min(w) }),
-    ("max(u, w)", |i, j, u, w, k| { _ = (i, j, u, w, k); u.max(w) }),
-    ("u32(clamp(i, j, 7))", |i, j, u, w, k| { _ = (i, j, u, w, k); i.max(j).min(7) as u32 }),
-    ("clamp(u, w, k)", |i, j, u, w, k| { _ = (i, j, u, w, k); u.max(w).min(k) }),
-    ("u32(abs(i))", |i, j, u, w, k| { _ = (i, j, u, w, k); i.wrapping_abs() as u32 }),
-    ("u32(sign(i))", |i, j, u, w, k| { _ = (i, j, u, w, k); i.signum() as u32 }),
-    ("u32(i < j)", |i, j, u, w, k| { _ = (i, j, u, w, k); u32::from(i < j) }),
-    ("u32(i >= j)", |i, j, u, w, k| { _ = (i, j, u, w, k); u32::from(i >= j) }),
-    ("u32(u < w)", |i, j, u, w, k| { _ = (i, j, u, w, k); u32::from(u < w) }),
-    ("u32(u >= w)", |i, j, u, w, k| { _ = (i, j, u, w, k); u32::from(u >= w) }),
-    ("u32(i == j)", |i, j, u, w, k| { _ = (i, j, u, w, k); u32::from(i == j) }),
-    ("u32(u != w)", |i, j, u, w, k| { _ = (i, j, u, w, k); u32::from(u != w) }),
-    ("countOneBits(u)", |i, j, u, w, k| { _ = (i, j, u, w, k); u.count_ones() }),
-    ("countLeadingZeros(u)", |i, j, u, w, k| { _ = (i, j, u, w, k); u.leading_zeros() }),
-    ("countTrailingZeros(u)", |i, j, u, w, k| { _ = (i, j, u, w, k); u.trailing_zeros() }),
-    ("reverseBits(u)", |i, j, u, w, k| { _ = (i, j, u, w, k); u.reverse_bits() }),
-    ("firstTrailingBit(u)", |i, j, u, w, k| { _ = (i, j, u, w, k); if u == 0 { u32::MAX } else { u.trailing_zeros() } }),
-    ("firstLeadingBit(u)", |i, j, u, w, k| { _ = (i, j, u, w, k); if u == 0 { u32::MAX } else { 31 - u.leading_zeros() } }),
-    ("u32(firstLeadingBit(i))", |i, j, u, w, k| { _ = (i, j, u, w, k); (0..32).rev().find(|b| (i >> b) & 1 != i32::from(i < 0)).unwrap_or(u32::MAX) }),
-    ("extractBits(u, w, k)", |i, j, u, w, k| { _ = (i, j, u, w, k); (0..k.min(32)).filter(|b| w.saturating_add(*b) < 32).map(|b| ((u >> (w + b)) & 1) << b).sum() }),
-    ("insertBits(u, 21u, w, k)", |i, j, u, w, k| { _ = (i, j, u, w, k); (0..32u32).map(|b| if b >= w && b - w < k { ((21u32.checked_shr(b - w).unwrap_or(0)) & 1) << b } else { u & (1 << b) }).sum() }),
-    ("u32(dot(vec2(i, j), vec2(j, i)))", |i, j, u, w, k| { _ = (i, j, u, w, k); i.wrapping_mul(j).wrapping_mul(2) as u32 }),
-    ("bitcast<u32>(i)", |i, j, u, w, k| { _ = (i, j, u, w, k); i as u32 }),
-    ("u32(bool(u) && i > j)", |i, j, u, w, k| { _ = (i, j, u, w, k); u32::from(u != 0 && i > j) }),
-    ("u32(!(u > w))", |i, j, u, w, k| { _ = (i, j, u, w, k); u32::from(u <= w) }),
+    ("u32(i + j)", |i, j, u, w, k| {
+        _ = (i, j, u, w, k);
+        i.wrapping_add(j) as u32
+    }),
+    ("u32(i - j)", |i, j, u, w, k| {
+        _ = (i, j, u, w, k);
+        i.wrapping_sub(j) as u32
+    }),
+    ("u32(i * j)", |i, j, u, w, k| {
+        _ = (i, j, u, w, k);
+        i.wrapping_mul(j) as u32
+    }),
+    ("u32(i / j)", |i, j, u, w, k| {
+        _ = (i, j, u, w, k);
+        i.checked_div(j).unwrap_or(i) as u32
+    }),
+    ("u32(i % j)", |i, j, u, w, k| {
+        _ = (i, j, u, w, k);
+        i.checked_rem(j).unwrap_or(0) as u32
+    }),
+    ("u / w", |i, j, u, w, k| {
+        _ = (i, j, u, w, k);
+        u.checked_div(w).unwrap_or(u)
+    }),
+    ("u % w", |i, j, u, w, k| {
+        _ = (i, j, u, w, k);
+        u.checked_rem(w).unwrap_or(0)
+    }),
+    ("u * w", |i, j, u, w, k| {
+        _ = (i, j, u, w, k);
+        u.wrapping_mul(w)
+    }),
+    ("u - w", |i, j, u, w, k| {
+        _ = (i, j, u, w, k);
+        u.wrapping_sub(w)
+    }),
+    ("u & w", |i, j, u, w, k| {
+        _ = (i, j, u, w, k);
+        u & w
+    }),
+    ("u | w", |i, j, u, w, k| {
+        _ = (i, j, u, w, k);
+        u | w
+    }),
+    ("u ^ w", |i, j, u, w, k| {
+        _ = (i, j, u, w, k);
+        u ^ w
+    }),
+    ("~u", |i, j, u, w, k| {
+        _ = (i, j, u, w, k);
+        !u
+    }),
+    ("u32(-i)", |i, j, u, w, k| {
+        _ = (i, j, u, w, k);
+        i.wrapping_neg() as u32
+    }),
+    ("u << k", |i, j, u, w, k| {
+        _ = (i, j, u, w, k);
+        u << (k % 32)
+    }),
+    ("u >> k", |i, j, u, w, k| {
+        _ = (i, j, u, w, k);
+        u >> (k % 32)
+    }),
+    ("u32(i >> k)", |i, j, u, w, k| {
+        _ = (i, j, u, w, k);
+        (i >> (k % 32)) as u32
+    }),
+    ("u32(min(i, j))", |i, j, u, w, k| {
+        _ = (i, j, u, w, k);
+        i.min(j) as u32
+    }),
+    ("u32(max(i, j))", |i, j, u, w, k| {
+        _ = (i, j, u, w, k);
+        i.max(j) as u32
+    }),
+    ("min(u, w)", |i, j, u, w, k| {
+        _ = (i, j, u, w, k);
+        u.min(w)
+    }),
+    ("max(u, w)", |i, j, u, w, k| {
+        _ = (i, j, u, w, k);
+        u.max(w)
+    }),
+    ("u32(clamp(i, j, 7))", |i, j, u, w, k| {
+        _ = (i, j, u, w, k);
+        i.max(j).min(7) as u32
+    }),
+    ("clamp(u, w, k)", |i, j, u, w, k| {
+        _ = (i, j, u, w, k);
+        u.max(w).min(k)
+    }),
+    ("u32(abs(i))", |i, j, u, w, k| {
+        _ = (i, j, u, w, k);
+        i.wrapping_abs() as u32
+    }),
+    ("u32(sign(i))", |i, j, u, w, k| {
+        _ = (i, j, u, w, k);
+        i.signum() as u32
+    }),
+    ("u32(i < j)", |i, j, u, w, k| {
+        _ = (i, j, u, w, k);
+        u32::from(i < j)
+    }),
+    ("u32(i >= j)", |i, j, u, w, k| {
+        _ = (i, j, u, w, k);
+        u32::from(i >= j)
+    }),
+    ("u32(u < w)", |i, j, u, w, k| {
+        _ = (i, j, u, w, k);
+        u32::from(u < w)
+    }),
+    ("u32(u >= w)", |i, j, u, w, k| {
+        _ = (i, j, u, w, k);
+        u32::from(u >= w)
+    }),
+    ("u32(i == j)", |i, j, u, w, k| {
+        _ = (i, j, u, w, k);
+        u32::from(i == j)
+    }),
+    ("u32(u != w)", |i, j, u, w, k| {
+        _ = (i, j, u, w, k);
+        u32::from(u != w)
+    }),
+    ("countOneBits(u)", |i, j, u, w, k| {
+        _ = (i, j, u, w, k);
+        u.count_ones()
+    }),
+    ("countLeadingZeros(u)", |i, j, u, w, k| {
+        _ = (i, j, u, w, k);
+        u.leading_zeros()
+    }),
+    ("countTrailingZeros(u)", |i, j, u, w, k| {
+        _ = (i, j, u, w, k);
+        u.trailing_zeros()
+    }),
+    ("reverseBits(u)", |i, j, u, w, k| {
+        _ = (i, j, u, w, k);
+        u.reverse_bits()
+    }),
+    ("firstTrailingBit(u)", |i, j, u, w, k| {
+        _ = (i, j, u, w, k);
+        if u == 0 { u32::MAX } else { u.trailing_zeros() }
+    }),
+    ("firstLeadingBit(u)", |i, j, u, w, k| {
+        _ = (i, j, u, w, k);
+        if u == 0 { u32::MAX } else { 31 - u.leading_zeros() }
+    }),
+    ("u32(firstLeadingBit(i))", |i, j, u, w, k| {
+        _ = (i, j, u, w, k);
+        (0..32).rev().find(|b| (i >> b) & 1 != i32::from(i < 0)).unwrap_or(u32::MAX)
+    }),
+    ("extractBits(u, w, k)", |i, j, u, w, k| {
+        _ = (i, j, u, w, k);
+        (0..k.min(32)).filter(|b| w.saturating_add(*b) < 32).map(|b| ((u >> (w + b)) & 1) << b).sum()
+    }),
+    ("insertBits(u, 21u, w, k)", |i, j, u, w, k| {
+        _ = (i, j, u, w, k);
+        (0..32u32)
+            .map(
+                |b| if b >= w && b - w < k { ((21u32.checked_shr(b - w).unwrap_or(0)) & 1) << b } else { u & (1 << b) },
+            )
+            .sum()
+    }),
+    ("u32(dot(vec2(i, j), vec2(j, i)))", |i, j, u, w, k| {
+        _ = (i, j, u, w, k);
+        i.wrapping_mul(j).wrapping_mul(2) as u32
+    }),
+    ("bitcast<u32>(i)", |i, j, u, w, k| {
+        _ = (i, j, u, w, k);
+        i as u32
+    }),
+    ("u32(bool(u) && i > j)", |i, j, u, w, k| {
+        _ = (i, j, u, w, k);
+        u32::from(u != 0 && i > j)
+    }),
+    ("u32(!(u > w))", |i, j, u, w, k| {
+        _ = (i, j, u, w, k);
+        u32::from(u <= w)
+    }),
 ];
 
 /// Whole numbers that `f32` holds, so that they come in as they are.

@@ -142,13 +142,31 @@ impl Float {
                     "-" => x - y,
                     "*" => x * y,
                     "/" => x / y,
-                    "min" => if y < x { y } else { x },
-                    "max" => if x < y { y } else { x },
+                    "min" => {
+                        if y < x {
+                            y
+                        } else {
+                            x
+                        }
+                    }
+                    "max" => {
+                        if x < y {
+                            y
+                        } else {
+                            x
+                        }
+                    }
                     "step" => F::from_f64(if x <= y { 1.0 } else { 0.0 }),
                     _ => x.atan2(y),
                 }
             }
-            Self::Select(c, ab) => if c.value(s, v) { ab[0].value(s, v) } else { ab[1].value(s, v) },
+            Self::Select(c, ab) => {
+                if c.value(s, v) {
+                    ab[0].value(s, v)
+                } else {
+                    ab[1].value(s, v)
+                }
+            }
             Self::Whole(a) => F::from_i32(a.value(s, v)),
             Self::Element(i, abc) => abc[(i.value(s, v) as u32).min(2) as usize].value(s, v),
             Self::Call(ab) => called(ab[0].value(s, v), ab[1].value(s, v)),
@@ -390,10 +408,7 @@ fn statements() -> BoxedStrategy<Vec<Statement>> {
     ];
     let one = leaf.prop_recursive(3, 24, 4, |inner| {
         let some = || prop::collection::vec(inner.clone(), 0..4);
-        let whole = prop_oneof![
-            (-2i8..4).prop_map(Int::Constant),
-            float().prop_map(|a| Int::Of(a.into())),
-        ];
+        let whole = prop_oneof![(-2i8..4).prop_map(Int::Constant), float().prop_map(|a| Int::Of(a.into())),];
         prop_oneof![
             2 => (truth(), some(), some()).prop_map(|(c, yes, no)| Statement::If(c, yes, no)),
             2 => (1u8..5, some()).prop_map(|(count, body)| Statement::Repeat(count, body)),

@@ -34,7 +34,8 @@ fn shade_must_be_there_and_of_its_type() {
     assert!(error.starts_with("test.wgsl:1:4: no function `shade`, wanted"), "{error}");
     assert!(error.contains("; is it `shde`?"), "{error}");
     let error = refused("fn shade(p: vec3<f32>) -> vec4<f32> { return vec4(p, 1.0); }");
-    let wanted = "test.wgsl:1:4: `shade` is `fn shade(p: vec3<f32>) -> vec4<f32>`, wanted `fn shade(s: Sample) -> Medium`";
+    let wanted =
+        "test.wgsl:1:4: `shade` is `fn shade(p: vec3<f32>) -> vec4<f32>`, wanted `fn shade(s: Sample) -> Medium`";
     assert!(error.starts_with(wanted), "{error}");
     assert!(refused("fn shade(s: Sample) {}").contains("`shade` is `fn shade(s: Sample)`, wanted"));
     let error = with_shade("fn shade_segment(s: Sample) -> Medium { return Medium(); }");
@@ -97,7 +98,9 @@ fn what_is_not_for_shaders_is_refused_by_name() {
 
 #[test]
 fn directives_are_refused() {
-    for text in ["enable f16;", "requires readonly_and_readwrite_storage_textures;", "diagnostic(off, derivative_uniformity);"] {
+    for text in
+        ["enable f16;", "requires readonly_and_readwrite_storage_textures;", "diagnostic(off, derivative_uniformity);"]
+    {
         let error = refused(&format!("{text}\n{SHADE}"));
         assert!(error.starts_with("test.wgsl:1:1: directive `"), "{error}");
     }
@@ -112,7 +115,10 @@ fn names_that_would_hide_others_are_refused() {
         ]
     };
     for (text, wanted) in [
-        ("fn volume_gradient(p: vec3<f32>) {}", "`volume_gradient` would hide the function of that name of the parameter `volume`"),
+        (
+            "fn volume_gradient(p: vec3<f32>) {}",
+            "`volume_gradient` would hide the function of that name of the parameter `volume`",
+        ),
         ("fn f(p: vec3<f32>) { let volume = 1.0; }", "`volume` would hide the function"),
         ("fn f(mode: f32) {}", "`mode` would hide the function"),
         ("const mode_cold_blue = 1;", "`mode_cold_blue` would hide the function"),
@@ -130,7 +136,9 @@ fn names_that_would_hide_others_are_refused() {
         assert!(error.starts_with("test.wgsl:2:"), "{error}");
     }
     // Inside a function built-ins may be hidden, as WGSL has it, and members have names of their own.
-    let text = format!("{SHADE}struct S {{ volume: f32, exp: f32 }} fn f(x: S) -> f32 {{ let step = x.volume; return step; }}");
+    let text = format!(
+        "{SHADE}struct S {{ volume: f32, exp: f32 }} fn f(x: S) -> f32 {{ let step = x.volume; return step; }}"
+    );
     Program::new(&entry(&text, Compositing::Over, parameters())).unwrap();
 }
 

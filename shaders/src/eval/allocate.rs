@@ -43,8 +43,11 @@ pub fn allocate<F: Real>(unplaced: Unplaced<F>) -> Result<Kernel<F>, String> {
     float_constants.iter().for_each(|(reg, _)| _ = rows.insert(*reg, floats.keep()));
     bits_constants.iter().for_each(|(reg, _)| _ = rows.insert(*reg, bits.keep()));
     inputs.retain(|(_, reg)| spans.get(reg).is_some_and(|span| span.1 > 0));
-    let mut order: Vec<(Span, Reg)> =
-        spans.iter().map(|(reg, span)| (*span, *reg)).filter(|(span, reg)| span.1 > 0 && !rows.contains_key(reg)).collect();
+    let mut order: Vec<(Span, Reg)> = spans
+        .iter()
+        .map(|(reg, span)| (*span, *reg))
+        .filter(|(span, reg)| span.1 > 0 && !rows.contains_key(reg))
+        .collect();
     order.sort_unstable();
     for (span, reg) in order {
         let of = if classes.get(&reg) == Some(&Class::Bits) { &mut bits } else { &mut floats };

@@ -32,24 +32,67 @@ pub enum Inst {
     ToBits(ToBits, Reg, Reg),
     ToFloat(ToFloat, Reg, Reg),
     /// `x · 2^n`.
-    Ldexp { to: Reg, value: Reg, exponent: Reg },
+    Ldexp {
+        to: Reg,
+        value: Reg,
+        exponent: Reg,
+    },
     /// The second where the condition holds, else the third.
-    Select { class: Class, to: Reg, condition: Reg, accept: Reg, reject: Reg },
-    Copy { class: Class, to: Reg, from: Reg },
+    Select {
+        class: Class,
+        to: Reg,
+        condition: Reg,
+        accept: Reg,
+        reject: Reg,
+    },
+    Copy {
+        class: Class,
+        to: Reg,
+        from: Reg,
+    },
     /// Writes only where the mask holds.
-    Blend { class: Class, to: Reg, mask: Reg, from: Reg },
+    Blend {
+        class: Class,
+        to: Reg,
+        mask: Reg,
+        from: Reg,
+    },
     /// The register that the index picks, the last one at most.
-    Gather { class: Class, to: Reg, index: Reg, from: Box<[Reg]> },
+    Gather {
+        class: Class,
+        to: Reg,
+        index: Reg,
+        from: Box<[Reg]>,
+    },
     /// Writes the register that the index picks, the last one at most.
-    Scatter { class: Class, to: Box<[Reg]>, index: Reg, mask: Option<Reg>, from: Reg },
+    Scatter {
+        class: Class,
+        to: Box<[Reg]>,
+        index: Reg,
+        mask: Option<Reg>,
+        from: Reg,
+    },
     /// Asks the environment. Results that nobody wants have no register.
-    Call { function: u32, arguments: Box<[Reg]>, results: Box<[Option<Reg>]>, mask: Option<Reg> },
+    Call {
+        function: u32,
+        arguments: Box<[Reg]>,
+        results: Box<[Option<Reg>]>,
+        mask: Option<Reg>,
+    },
     /// Goes on at `to` where the mask holds nowhere.
-    Skip { mask: Reg, to: u32 },
+    Skip {
+        mask: Reg,
+        to: u32,
+    },
     /// The head of a loop: leaves to `exit` where the mask holds nowhere, else counts.
-    Head { mask: Reg, exit: u32 },
+    Head {
+        mask: Reg,
+        exit: u32,
+    },
     /// Back to the head of a loop.
-    Back { to: u32 },
+    Back {
+        to: u32,
+    },
 }
 
 /// How an instruction touches a register.

@@ -37,9 +37,7 @@ pub trait Environment<F> {
 #[non_exhaustive]
 pub enum Overrun {
     /// A sample's loops went round too often.
-    #[error(
-        "shader {shader:?}: the loops of one sample go round more than {budget} times; the shader may never end"
-    )]
+    #[error("shader {shader:?}: the loops of one sample go round more than {budget} times; the shader may never end")]
     Loops {
         /// The shader.
         shader: String,
@@ -47,7 +45,9 @@ pub enum Overrun {
         budget: u32,
     },
     /// The rows given are not those that the kernel reads.
-    #[error("shader {shader:?}: {found} input rows for {samples} samples, wanted {wanted} of that length, at most {BATCH}")]
+    #[error(
+        "shader {shader:?}: {found} input rows for {samples} samples, wanted {wanted} of that length, at most {BATCH}"
+    )]
     Inputs {
         /// The shader.
         shader: String,
@@ -91,7 +91,12 @@ impl<'k, F: Real> Machine<'k, F> {
     ///
     /// # Errors
     /// If a sample's loops exceed the budget, or the rows are not those.
-    pub fn run(&mut self, samples: usize, inputs: &[&[F]], environment: &mut dyn Environment<F>) -> Result<(), Overrun> {
+    pub fn run(
+        &mut self,
+        samples: usize,
+        inputs: &[&[F]],
+        environment: &mut dyn Environment<F>,
+    ) -> Result<(), Overrun> {
         let wanted = self.kernel.inputs.len();
         if inputs.len() != wanted || samples > BATCH || inputs.iter().any(|row| row.len() != samples) {
             let shader = self.kernel.shader.clone();

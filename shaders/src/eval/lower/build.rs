@@ -1,6 +1,6 @@
 //! Instructions, emitted or computed at once where all operands are constant.
 
-use super::{Lowered, LowerError, Lowerer, MAX_CODE, Mask, Scalar};
+use super::{LowerError, Lowered, Lowerer, MAX_CODE, Mask, Scalar};
 use crate::eval::{
     Real,
     code::{Class, Inst, Reg},

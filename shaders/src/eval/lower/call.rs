@@ -2,7 +2,7 @@
 
 use naga::{Handle, ScalarKind, TypeInner};
 
-use super::{Frame, Lowered, LowerError, Lowerer, Mask, Scalar, Value, expression::pick, flow::Returns};
+use super::{Frame, LowerError, Lowered, Lowerer, Mask, Scalar, Value, expression::pick, flow::Returns};
 use crate::{
     eval::{
         Real,

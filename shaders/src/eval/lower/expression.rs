@@ -4,10 +4,7 @@ use std::rc::Rc;
 
 use naga::{BinaryOperator, Expression, Handle, Literal, RelationalFunction, ScalarKind, TypeInner, UnaryOperator};
 
-use super::{
-    Frame, Lowered, LowerError, Lowerer, Scalar, Value,
-    place::Index,
-};
+use super::{Frame, LowerError, Lowered, Lowerer, Scalar, Value, place::Index};
 use crate::eval::{
     Real,
     code::Inst,
@@ -178,7 +175,12 @@ impl<'p, F: Real> Lowerer<'p, F> {
         }
     }
 
-    fn access(&mut self, frame: &mut Frame<'p, F>, base: Handle<Expression>, index: Handle<Expression>) -> Lowered<Value<F>> {
+    fn access(
+        &mut self,
+        frame: &mut Frame<'p, F>,
+        base: Handle<Expression>,
+        index: Handle<Expression>,
+    ) -> Lowered<Value<F>> {
         let inner = self.type_of(frame, base);
         let inner = self.pointee(inner);
         let (_, size, count) = self.element(inner, 0)?;
@@ -204,7 +206,12 @@ impl<'p, F: Real> Lowerer<'p, F> {
         self.type_of(frame, handle).scalar().map_or(ScalarKind::Float, |s| s.kind)
     }
 
-    fn unary(&mut self, frame: &mut Frame<'p, F>, op: UnaryOperator, expr: Handle<Expression>) -> Lowered<Vec<Scalar<F>>> {
+    fn unary(
+        &mut self,
+        frame: &mut Frame<'p, F>,
+        op: UnaryOperator,
+        expr: Handle<Expression>,
+    ) -> Lowered<Vec<Scalar<F>>> {
         let float = self.kind(frame, expr) == ScalarKind::Float;
         let data = self.data(frame, expr)?;
         self.each(data.len(), |this, i| match op {

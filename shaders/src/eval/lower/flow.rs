@@ -7,7 +7,7 @@
 
 use naga::{Block, Handle, Statement, SwitchCase, SwitchValue};
 
-use super::{Frame, Lowered, LowerError, Lowerer, Mask, Scalar, Value};
+use super::{Frame, LowerError, Lowered, Lowerer, Mask, Scalar, Value};
 use crate::eval::{
     Real,
     code::{Class, Inst, Reg},
@@ -237,18 +237,16 @@ impl<'p, F: Real> Lowerer<'p, F> {
                 None => frame.returns.value = Some(value.to_vec()),
             }
         }
-        if frame.loops > 0 && let Some(gone) = frame.returns.gone {
+        if frame.loops > 0
+            && let Some(gone) = frame.returns.gone
+        {
             self.note(gone, mask)?;
         }
         Ok(Mask::Dead)
     }
 
     /// Lowers what only the samples of a mask do, and leaves it out where there are none.
-    fn region(
-        &mut self,
-        mask: Mask,
-        inside: impl FnOnce(&mut Self) -> Lowered<Mask>,
-    ) -> Lowered<Mask> {
+    fn region(&mut self, mask: Mask, inside: impl FnOnce(&mut Self) -> Lowered<Mask>) -> Lowered<Mask> {
         let Mask::Some(reg) = mask else { return inside(self) };
         let at = self.code.len();
         self.emit(Inst::Skip { mask: reg, to: 0 })?;

@@ -4,7 +4,7 @@ use std::rc::Rc;
 
 use naga::{Expression, Handle, MathFunction, ScalarKind, TypeInner};
 
-use super::{Frame, Lowered, LowerError, Lowerer, Scalar, expression::pick};
+use super::{Frame, LowerError, Lowered, Lowerer, Scalar, expression::pick};
 use crate::eval::{
     Real,
     ops::{Bits1, Bits2, Bits3, Compare, Float1, Float2, Float3, ToBits},

@@ -4,7 +4,7 @@ use std::rc::Rc;
 
 use naga::{Expression, Handle, TypeInner};
 
-use super::{Frame, Lowered, LowerError, Lowerer, Mask, Scalar, Value};
+use super::{Frame, LowerError, Lowered, Lowerer, Mask, Scalar, Value};
 use crate::eval::{
     Real,
     code::{Class, Inst, Reg},
@@ -84,7 +84,12 @@ impl<'p, F: Real> Lowerer<'p, F> {
         }
     }
 
-    pub(super) fn index(&mut self, frame: &mut Frame<'p, F>, index: Handle<Expression>, count: usize) -> Lowered<Index<F>> {
+    pub(super) fn index(
+        &mut self,
+        frame: &mut Frame<'p, F>,
+        index: Handle<Expression>,
+        count: usize,
+    ) -> Lowered<Index<F>> {
         let last = count.saturating_sub(1) as u32;
         let index = self.scalar(frame, index)?;
         // As an unsigned number: what is negative is beyond the end, too.

@@ -1,0 +1,43 @@
+// gradient: a table, lit by the gradient.
+//
+//     colour = c·(ambient + diffuse·n·l) + specular·m^shininess
+//
+// with the normal n along the gradient of the value (central differences over one voxel either
+// way, in world units), l the direction to the light and v that to the eye, all in world space;
+// m = n·(l + v)/|l + v| (J. Blinn, "Models of light reflection for computer synthesized
+// pictures", SIGGRAPH 1977) or m = v·reflect(−l, n) (B. T. Phong, CACM 18(6), 1975).
+// `lightdir` and `light_position` are in world space; a head light is at the eye.
+
+// The direction to the light, of length 1, along the axes of the world.
+fn to_light(s: Sample) -> vec3<f32> {
+    switch light() {
+        case light_directional: { return normalize(lightdir()); }
+        case light_positional: { return normalize(light_position_local() - s.position); }
+        default: { return s.view; }
+    }
+}
+
+// Colour of a lit point. The normal is the gradient turned to the eye; where there is none, only
+// the ambient light is left.
+fn lit(color: vec3<f32>, s: Sample) -> vec3<f32> {
+    let gradient = volume_gradient(s.position);
+    let size = length(gradient);
+    if !(size > 0.0) { return color * ambient(); }
+    let normal = faceForward(gradient / size, s.direction, gradient);
+    let l = to_light(s);
+    let cosine = dot(normal, l);
+    if cosine <= 0.0 { return color * ambient(); }
+    var mirrored = 0.0;
+    if model() == model_phong {
+        mirrored = max(dot(reflect(-l, normal), s.view), 0.0);
+    } else {
+        mirrored = max(dot(normal, normalize(l + s.view)), 0.0);
+    }
+    return color * (ambient() + diffuse() * cosine) + specular() * pow(mirrored, shininess());
+}
+
+fn shade(s: Sample) -> Medium {
+    let m = lookup_table(volume(s.position));
+    if m.extinction == 0.0 { return m; }
+    return Medium(lit(m.color, s), m.extinction);
+}

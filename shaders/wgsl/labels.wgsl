@@ -1,0 +1,15 @@
+// labels: a segmentation.
+//
+// The label of the nearest sample, through a table with a control point for each label: labels
+// between two others do not exist, so nothing is interpolated. Where a volume is given, too, its
+// interpolated value through `value_table` multiplies colour and opacity. Labels are whole numbers
+// up to 2^24, which single precision holds.
+fn shade(s: Sample) -> Medium {
+    let label = label_table_color(round(labels_nearest(s.position)));
+    if volume_given() {
+        let value = value_table_color(volume(s.position));
+        return medium(label.rgb * value.rgb, label.a * value.a);
+    } else {
+        return medium(label.rgb, label.a);
+    }
+}

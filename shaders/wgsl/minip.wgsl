@@ -1,0 +1,7 @@
+// minip: the lowest value along the ray, classified.
+//
+// What the ray's compositing takes is the interpolated value in data units; the table then gives
+// colour and opacity once a ray, and no length counts in the opacity.
+fn value(s: Sample) -> f32 { return volume(s.position); }
+
+fn shade(s: Sample) -> Medium { return lookup_table(s.value); }
