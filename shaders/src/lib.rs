@@ -19,7 +19,7 @@ pub mod plain;
 mod program;
 mod refuse;
 pub mod signatures;
-mod source;
+pub mod source;
 mod tokens;
 
 pub use builtin::{Native, builtin, recognise};
