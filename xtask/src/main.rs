@@ -1,6 +1,7 @@
 //! What people who work on Volact repeat: `cargo xtask --help`.
 
 mod check;
+mod header;
 mod peer;
 mod peer_scene;
 mod peers;
@@ -25,6 +26,8 @@ enum Task {
     Peer(peer::Args),
     /// Compare with other renderers in one run, interleaved, and write the tables.
     Peers(peers::Args),
+    /// Generate the C header of the plugin boundary.
+    Header,
     /// Time `cpu` over picture sizes, volume sizes and threads.
     Scaling,
 }
@@ -35,6 +38,7 @@ fn main() -> anyhow::Result<()> {
         Task::Check => check::all(),
         Task::Peer(args) => peer::run(&args),
         Task::Peers(args) => peers::run(&args),
+        Task::Header => header::run(),
         Task::Scaling => scaling::run(),
     }
 }
