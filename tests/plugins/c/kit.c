@@ -311,9 +311,15 @@ static const VolactShaderTable *const shaders[] = { &tint };
 static const VolactGeometryTable *const geometries[] = { &octa };
 static const VolactLoaderTable *const loaders[] = { &ramp };
 
+#ifndef KIT_NAME
+#define KIT_NAME kit
+#endif
+#define STRING(x) STRING2(x)
+#define STRING2(x) #x
+
 static const VolactPlugin plugin = {
   sizeof plugin, 0,
-  VOLACT_TEXT("kit"), VOLACT_TEXT("1.0"), VOLACT_TEXT("one of each kind, in C"),
+  VOLACT_TEXT(STRING(KIT_NAME)), VOLACT_TEXT("1.0"), VOLACT_TEXT("one of each kind, in C"),
   actions, 1, shaders, 1, geometries, 1, loaders, 1,
 };
 
