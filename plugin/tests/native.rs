@@ -84,9 +84,9 @@ fn action_draws_the_maximum_along_z() {
         action.begin_draw(&from_above()).unwrap();
         action.draw(&shape).unwrap();
         let frame = action.end_draw().unwrap();
-        for (y, x) in (0..6).flat_map(|y| (0..7).map(move |x| (y, x))) {
+        for (y, x) in (0..6usize).flat_map(|y| (0..7usize).map(move |x| (y, x))) {
             // Columns to x and rows to −y, from a border of one pixel.
-            let (grey, depth) = match (x as usize).checked_sub(1).zip(4usize.checked_sub(y)) {
+            let (grey, depth) = match x.checked_sub(1).zip(4usize.checked_sub(y)) {
                 Some((i, j)) if i < 5 && j < 4 => {
                     (gain as f32 * f32::from((0..3).map(|k| value(i, j, k)).max().unwrap()) / 255.0, 8.0)
                 }

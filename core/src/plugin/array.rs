@@ -121,7 +121,7 @@ pub(super) unsafe fn receive(view: &ArrayView, what: &str, passing: Passing) -> 
     if length > 0 && view.data.is_null() {
         return Err(Fault::bad(format!("data of {what}"), "a null pointer", format!("{length} bytes")));
     }
-    if length > 0 && view.data.addr() % size != 0 {
+    if length > 0 && !view.data.addr().is_multiple_of(size) {
         let found = format!("at {:p}", view.data);
         return Err(Fault::bad(format!("data of {what}"), found, format!("an address that is a multiple of {size}")));
     }
@@ -180,7 +180,8 @@ mod tests {
 
     #[test]
     fn damaged_views_are_refused_and_still_released() {
-        let damages: [(fn(&mut ArrayView), &str); 7] = [
+        type Damage = fn(&mut ArrayView);
+        let damages: [(Damage, &str); 7] = [
             (|v| v.scalar = 77, "scalar type"),
             (|v| v.rank = 5, "rank"),
             (|v| v.shape = [u64::MAX, 3, 0, 0], "shape"),

@@ -75,15 +75,19 @@ pub(super) fn lend_declaration(declaration: &Declaration, arena: &mut Arena) -> 
 /// What the view says is true.
 pub(super) unsafe fn decode_declaration(view: &DeclarationView, kind: Kind) -> Result<Declaration, Fault> {
     let what = |part: &str| format!("{part} of a registered {}", kind.name());
-    // SAFETY: as promised by the caller, here and below.
+    // SAFETY: as promised by the caller.
     let name = unsafe { string_of(view.name, &what("name")) }?;
     if name.is_empty() {
         return Err(Fault::new(Code::BadName, format!("{} is empty", what("name"))));
     }
+    // SAFETY: as promised by the caller.
     let version = unsafe { string_of(view.version, &what("version")) }?;
+    // SAFETY: as promised by the caller.
     let description = unsafe { string_of(view.description, &what("description")) }?;
     let mut made = Declaration::new(kind, &name, &version, &description);
+    // SAFETY: as promised by the caller.
     for parameter in unsafe { list_of(view.parameters, view.parameter_count, "declared parameters") }? {
+        // SAFETY: as promised by the caller.
         let decl = unsafe { decode_parameter(parameter) };
         let decl = decl.map_err(|f| Fault::new(f.code, format!("{} {name:?}: {}", kind.name(), f.message)))?;
         if made.parameter(&decl.name).is_some() {
@@ -98,7 +102,7 @@ pub(super) unsafe fn decode_declaration(view: &DeclarationView, kind: Kind) -> R
 /// # Safety
 /// What the view says is true.
 unsafe fn decode_parameter(view: &ParameterDeclView) -> Result<ParameterDecl, Fault> {
-    // SAFETY: as promised by the caller, here and below.
+    // SAFETY: as promised by the caller.
     let name = unsafe { string_of(view.name, "name of a parameter") }?;
     let types: Vec<_> = KINDS.iter().filter(|(_, kind)| view.kinds >> kind & 1 == 1).map(|(t, _)| *t).collect();
     let known = KINDS.iter().fold(0, |bits, (_, kind)| bits | 1u64 << kind);
@@ -107,11 +111,14 @@ unsafe fn decode_parameter(view: &ParameterDeclView) -> Result<ParameterDecl, Fa
         return Err(Fault::new(Code::Unsupported, message));
     }
     let mut words = Vec::new();
+    // SAFETY: as promised by the caller.
     for choice in unsafe { list_of(view.choices, view.choice_count, "choices") }? {
+        // SAFETY: as promised by the caller.
         words.push(unsafe { string_of(*choice, "a choice") }?);
     }
     let bounded = flag(view.bounded, &format!("whether parameter {name:?} is bounded"))?;
-    if bounded && !(view.bounds[0] <= view.bounds[1]) {
+    let rise = view.bounds[0] <= view.bounds[1];
+    if bounded && !rise {
         let found = format!("{:?}", view.bounds);
         return Err(Fault::bad(format!("bounds of parameter {name:?}"), found, "two numbers that rise"));
     }
@@ -121,11 +128,14 @@ unsafe fn decode_parameter(view: &ParameterDeclView) -> Result<ParameterDecl, Fa
         default: None,
         bounds: bounded.then_some(view.bounds),
         choices: words,
+        // SAFETY: as promised by the caller.
         unit: unsafe { string_of(view.unit, "unit") }?,
+        // SAFETY: as promised by the caller.
         description: unsafe { string_of(view.description, "description") }?,
         name,
     };
     if !is_none(&view.default) {
+        // SAFETY: as promised by the caller.
         let value = unsafe { decode(&view.default, &mut Identities::default(), &decl.name, Passing::Lent) }?;
         let value = decl.accept(&value).map_err(|p| Fault::new(Code::BadValue, format!("default: {p}")))?;
         decl.default = Some(value);
@@ -152,9 +162,10 @@ mod tests {
 
     #[test]
     fn damaged_declarations_are_refused() {
+        type Damage = fn(&mut ParameterDeclView);
         let declaration = Declaration::new(Kind::Geometry, "ball", "1", "round")
             .with(ParameterDecl::new("radius", crate::ParameterType::Float, "its radius").default(1.0));
-        let damages: [(fn(&mut ParameterDeclView), &str); 5] = [
+        let damages: [(Damage, &str); 5] = [
             (|p| p.kinds = 0, "kinds of parameter \"radius\""),
             (|p| p.kinds |= 1 << 40, "kinds of parameter \"radius\""),
             (|p| p.required = 7, "wanted 0 or 1"),

@@ -117,6 +117,13 @@ unsafe extern "C" fn host_parallel_for(threads: u32, count: u64, task: Option<Ta
 #[derive(Clone, Copy)]
 struct User(*mut c_void);
 
+impl User {
+    /// By a method, so that the wrapper is what crosses to the thread.
+    fn pointer(self) -> *mut c_void {
+        self.0
+    }
+}
+
 // SAFETY: the caller of `parallel_for` says by calling it that its tasks may run on any thread.
 unsafe impl Send for User {}
 // SAFETY: as for Send.
@@ -128,15 +135,13 @@ fn run_tasks(threads: u32, count: u64, task: Task, user: User) {
     let threads = threads.min(usize::try_from(count).unwrap_or(usize::MAX));
     let next = AtomicU64::new(0);
     let work = || {
-        // The whole of it, so that the pointer's wrapper is what crosses to the thread.
-        let user = user;
         loop {
             let index = next.fetch_add(1, Ordering::Relaxed);
             if index >= count {
                 break;
             }
             // SAFETY: the caller of `parallel_for` gave the two together.
-            unsafe { task(user.0, index) };
+            unsafe { task(user.pointer(), index) };
         }
     };
     std::thread::scope(|scope| {

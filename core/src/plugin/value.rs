@@ -253,8 +253,9 @@ pub(super) unsafe fn decode(
     passing: Passing,
 ) -> Result<ParameterValue, Fault> {
     let what = format!("parameter {name:?}");
-    // SAFETY: as promised by the caller, here and below.
+    // SAFETY: as promised by the caller.
     let got = unsafe { receive(view, &what, passing) }?;
+    // SAFETY: as promised by the caller.
     let fields = unsafe { Fields::of(view, &what) }?;
     Ok(match view.kind {
         abi::KIND_VOLUME => ParameterValue::Volume(volume(view, got, &fields, known, &what)?),
@@ -432,9 +433,11 @@ fn attribute(got: Received, fields: &Fields<'_>, what: &str) -> Result<Attribute
 /// What the view says is true.
 pub(super) unsafe fn decode_attribute(parameter: &Parameter, passing: Passing) -> Result<Attribute, Fault> {
     let what = "an attribute";
-    // SAFETY: as promised by the caller, here and below.
+    // SAFETY: as promised by the caller.
     let got = unsafe { receive(&parameter.value, what, passing) }?;
+    // SAFETY: as promised by the caller.
     let name = unsafe { str_of(parameter.name, "name of an attribute") }?;
+    // SAFETY: as promised by the caller.
     let fields = unsafe { Fields::of(&parameter.value, what) }?;
     want_kind(&parameter.value, abi::KIND_ATTRIBUTE, what)?;
     let mut made = attribute(got, &fields, what)?;

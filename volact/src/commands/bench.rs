@@ -2,6 +2,7 @@
 
 use std::{
     fmt::Write as _,
+    path::PathBuf,
     process::ExitCode,
     time::{Duration, Instant},
 };
@@ -35,6 +36,13 @@ pub struct Args {
     /// Print JSON
     #[arg(long)]
     json: bool,
+}
+
+impl Args {
+    /// The config file that is named.
+    pub fn config(&self) -> Option<PathBuf> {
+        self.source.config.clone()
+    }
 }
 
 /// What a table or a JSON says above its rows.

@@ -8,6 +8,7 @@ pub mod completions;
 pub mod cuts;
 pub mod describe;
 pub mod info;
+pub mod plugins;
 pub mod progress;
 pub mod render;
 pub mod report;
@@ -31,6 +32,8 @@ pub enum Command {
     Info(info::Args),
     /// List all actions, shaders, geometries and loaders, or describe one in full
     Describe(describe::Args),
+    /// List the plugins that are found, what they register, and what was refused and why
+    Plugins(plugins::Args),
     /// Compare two pictures; exits with 1 where they differ by more than a threshold
     Compare(compare::Args),
     /// Measure how fast a scene is drawn
@@ -46,14 +49,33 @@ impl Command {
         leave_nothing_half_done();
         let mut registry = volact::with_builtins();
         registry.set_progress(progress::watch());
+        let plugins = self.load_plugins(&mut registry)?;
         match self {
             Self::Render(args) => render::run(args, &registry),
             Self::Info(args) => info::run(args, &registry),
             Self::Describe(args) => describe::run(args, &registry),
+            Self::Plugins(args) => match plugins {
+                Some(plugins) => plugins::run(args, &plugins),
+                None => Ok(ExitCode::SUCCESS),
+            },
             Self::Compare(args) => compare::run(args, &registry),
             Self::Bench(args) => bench::run(args, &registry),
             Self::Completions(args) => completions::run(args, &registry),
         }
+    }
+}
+
+impl Command {
+    /// Loads the plugins of the config in force, for commands that could use them.
+    fn load_plugins(&self, registry: &mut volact::Registry) -> anyhow::Result<Option<plugins::Plugins>> {
+        let named = match self {
+            Self::Render(args) => args.config(),
+            Self::Bench(args) => args.config(),
+            Self::Info(_) | Self::Describe(_) | Self::Plugins(_) => None,
+            Self::Compare(_) | Self::Completions(_) => return Ok(None),
+        };
+        let loudly = !matches!(self, Self::Plugins(_));
+        plugins::Plugins::load(named, registry, loudly).map(Some)
     }
 }
 

@@ -64,6 +64,11 @@ pub fn run(args: Args, registry: &Registry) -> anyhow::Result<ExitCode> {
 }
 
 impl Args {
+    /// The config file that is named.
+    pub fn config(&self) -> Option<PathBuf> {
+        self.source.config.clone()
+    }
+
     /// What a PNG shall be; all that can be said before drawing is said here.
     fn png(&self, output: &Path) -> anyhow::Result<PngOptions> {
         let format = PictureFormat::of(output)?;

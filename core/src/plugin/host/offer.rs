@@ -83,7 +83,7 @@ impl Offer {
     /// # Safety
     /// What the table says is true, and it lives as long as the process.
     pub unsafe fn read(table: &'static Plugin) -> Result<Self, Fault> {
-        // SAFETY: as promised by the caller, here and below.
+        // SAFETY: as promised by the caller.
         let name = unsafe { string_of(table.name, "name of the plugin") }?;
         if name.is_empty() || name.len() > 256 {
             return Err(Fault::new(Code::BadName, format!("name of the plugin is {name:?}, wanted 1 to 256 bytes")));
