@@ -2,6 +2,7 @@
 
 mod check;
 mod header;
+mod new_plugin;
 mod peer;
 mod peer_scene;
 mod peers;
@@ -28,6 +29,8 @@ enum Task {
     Peers(peers::Args),
     /// Generate the C header of the plugin boundary.
     Header,
+    /// Make a plugin's crate that builds, tests itself and draws something.
+    NewPlugin(new_plugin::Args),
     /// Time `cpu` over picture sizes, volume sizes and threads.
     Scaling,
 }
@@ -39,6 +42,7 @@ fn main() -> anyhow::Result<()> {
         Task::Peer(args) => peer::run(&args),
         Task::Peers(args) => peers::run(&args),
         Task::Header => header::run(),
+        Task::NewPlugin(args) => new_plugin::run(&args),
         Task::Scaling => scaling::run(),
     }
 }
