@@ -237,6 +237,9 @@ pub enum ActionError {
         /// What there is, and the cure.
         wanted: String,
     },
+    /// A plugin failed.
+    #[error(transparent)]
+    Plugin(#[from] crate::plugin::PluginError),
     /// The backend failed.
     #[error("action {action:?} failed")]
     Backend {

@@ -11,16 +11,24 @@
 //!     options: {"cpu": {"threads": 2}},            // for each action, below what a scene says
 //!     image: (size: (640, 480), background: (0, 0, 0, 1)),
 //!     view: "iso",                                 // of scenes that have no camera
+//!     plugins: [(name: "ring")],                   // libraries to load, each with or without a sha256
+//!     shader_folders: ["shaders"],                 // where shaders are, name.ron beside name.wgsl
+//!     plugin_folders: ["plugins"],                 // where they are looked for, from the config's folder on
+//!     names: {"torus": "ring"},                    // whose registration is taken where several claim it
 //! )"#)?;
 //! assert_eq!(config.prefer, ["wgpu", "vulkan", "cpu"]);
 //! assert_eq!(Config::parse("Config(version: 1)")?, Config::default());
 //! # Ok::<(), volact_core::scene::Problems>(())
 //! ```
 
-use std::{collections::BTreeMap, path::Path};
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+};
 
 use crate::{
     Options, View,
+    plugin::host::{Wanted, sha256_of},
     scene::{
         ParameterSpec, Problems, SceneError, background, parse_document, plain_parameters, read_text,
         reader::{At, Reader},
@@ -47,6 +55,14 @@ pub struct Config {
     pub background: [f32; 4],
     /// The view of a scene that does not say.
     pub view: View,
+    /// Folders of shaders, all of which are registered.
+    pub shader_folders: Vec<PathBuf>,
+    /// The plugins to load. No other document can name any.
+    pub plugins: Vec<Wanted>,
+    /// The folders in which they are looked for, first come first served.
+    pub plugin_folders: Vec<PathBuf>,
+    /// The plugin whose registration is taken, for names that several claim.
+    pub names: BTreeMap<String, String>,
 }
 
 impl Default for Config {
@@ -57,6 +73,10 @@ impl Default for Config {
             size: [512, 512],
             background: [0.0, 0.0, 0.0, 1.0],
             view: View::Front,
+            shader_folders: Vec::new(),
+            plugins: Vec::new(),
+            plugin_folders: Vec::new(),
+            names: BTreeMap::new(),
         }
     }
 }
@@ -75,14 +95,18 @@ impl Config {
         Ok(config.unwrap_or_default())
     }
 
-    /// Reads a config file.
+    /// Reads a config file; its folders are taken from the file's own folder on.
     ///
     /// # Errors
     /// If the file cannot be read, or all its problems.
     pub fn open(path: impl AsRef<Path>) -> Result<Self, SceneError> {
         let path = path.as_ref();
         let text = read_text(path)?;
-        Ok(Self::parse(&text).map_err(|problems| problems.of_file(path.display().to_string()))?)
+        let mut config = Self::parse(&text).map_err(|problems| problems.of_file(path.display().to_string()))?;
+        let base = path.parent().unwrap_or(Path::new(""));
+        let folders = config.shader_folders.iter_mut().chain(&mut config.plugin_folders);
+        folders.for_each(|folder| *folder = base.join(&*folder));
+        Ok(config)
     }
 
     /// The options of an action: those given, and below them those of this config.
@@ -94,7 +118,8 @@ impl Config {
 }
 
 fn read(reader: &mut Reader, at: &At) -> Option<Config> {
-    let fields = reader.fields(at, &["Config"], &["version", "prefer", "options", "image", "view"])?;
+    let known = ["version", "prefer", "options", "image", "view", "shader_folders", "plugins", "plugin_folders", "names"];
+    let fields = reader.fields(at, &["Config"], &known)?;
     reader.version(&fields, CONFIG_VERSION);
     let mut config = Config::default();
     if let Some(at) = fields.optional("prefer") {
@@ -116,8 +141,38 @@ fn read(reader: &mut Reader, at: &At) -> Option<Config> {
         let color = image.optional("background").and_then(|at| background(reader, &at));
         config.background = color.unwrap_or(config.background);
     }
+    if let Some(at) = fields.optional("plugins") {
+        let listed = reader.list(&at, "a list of plugins, [(name: \"…\")]").unwrap_or_default();
+        config.plugins = listed.iter().filter_map(|at| plugin(reader, at)).collect();
+    }
+    for (name, folders) in
+        [("shader_folders", &mut config.shader_folders), ("plugin_folders", &mut config.plugin_folders)]
+    {
+        if let Some(at) = fields.optional(name) {
+            let listed = reader.list(&at, "a list of folders").unwrap_or_default();
+            *folders = listed.iter().filter_map(|at| reader.text(at)).map(PathBuf::from).collect();
+        }
+    }
+    if let Some(at) = fields.optional("names") {
+        for (name, at) in reader.map(&at, "a map of plugins by registered name, {\"torus\": \"ring\"}") {
+            if let Some(plugin) = reader.name(&at) {
+                config.names.insert(name.to_owned(), plugin);
+            }
+        }
+    }
     config.view = fields.optional("view").and_then(|at| view(reader, &at)).unwrap_or_default();
     Some(config)
+}
+
+fn plugin(reader: &mut Reader, at: &At) -> Option<Wanted> {
+    let fields = reader.fields(at, &["Plugin"], &["name", "sha256"])?;
+    let name = reader.required(&fields, "name", "the plugin's name").and_then(|at| reader.name(&at));
+    let mut sha256 = None;
+    if let Some(at) = fields.optional("sha256") {
+        // A pin that cannot be read must not be taken for none.
+        sha256 = Some(reader.text(&at).and_then(sha256_of).or_else(|| reader.refuse(&at, "64 hexadecimal digits"))?);
+    }
+    Some(Wanted { name: name?, sha256 })
 }
 
 fn options(reader: &mut Reader, at: &At) -> Options {
@@ -145,11 +200,40 @@ mod tests {
         let text = "Config(\n  version: 2,\n  prefered: [],\n  options: {\"cpu\": {\"threads\": (1,)}},\n  view: \"frnt\",\n  image: (size: (0, 1)),\n)";
         let expected = "\
 2:12: version: found 2, wanted 1, the version of the format that this build reads
-3:3: found field `prefered`, wanted version, prefer, options, image, view; did you mean \"prefer\"?
+3:3: found field `prefered`, wanted version, prefer, options, image, view, shader_folders, plugins, plugin_folders, names; did you mean \"prefer\"?
 4:32: options.cpu.threads: found a tuple of 1 value, wanted 2, 3 or 4 numbers
 5:9: view: found \"frnt\", wanted one of front, back, left, right, top, bottom, iso; did you mean \"front\"?
 6:18: image.size[0]: found 0, wanted a whole number from 1 on";
         assert_eq!(Config::parse(text).unwrap_err().to_string(), expected);
+    }
+
+    #[test]
+    fn plugins_are_read_and_bad_pins_refused() {
+        let pin = "ab".repeat(32);
+        let text = format!(
+            "(version: 1, plugins: [(name: \"ring\"), (name: \"kit\", sha256: \"{pin}\")], \
+             shader_folders: [\"looks\"], plugin_folders: [\"here\", \"/there\"], names: {{\"torus\": \"ring\"}})"
+        );
+        let config = Config::parse(&text).unwrap();
+        let pins: Vec<_> = config.plugins.iter().map(|p| (p.name.as_str(), p.sha256)).collect();
+        assert_eq!(pins, [("ring", None), ("kit", Some([0xab; 32]))]);
+        assert_eq!(config.names["torus"], "ring");
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("config.ron");
+        std::fs::write(&path, &text).unwrap();
+        let config = Config::open(&path).unwrap();
+        assert_eq!(config.plugin_folders, [folder.path().join("here"), PathBuf::from("/there")]);
+        assert_eq!(config.shader_folders, [folder.path().join("looks")]);
+
+        let text = "(version: 1, plugins: [(name: \"kit\", sha256: \"abc\"), (sha256: 7), (nme: \"x\")])";
+        let words = Config::parse(text).unwrap_err().to_string();
+        for wanted in [
+            "plugins[0].sha256: found \"abc\", wanted 64 hexadecimal digits",
+            "plugins[1].name: found nothing",
+            "`nme`",
+        ] {
+            assert!(words.contains(wanted), "{words}");
+        }
     }
 
     #[test]

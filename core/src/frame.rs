@@ -5,7 +5,7 @@ use std::time::Duration;
 use glam::DVec3;
 use thiserror::Error;
 
-use crate::{Aabb, Camera, Clip, Opaque, Shape, View, Warning, camera::CameraError};
+use crate::{Aabb, Camera, Clip, Opaque, Pixels, Shape, View, Warning, camera::CameraError};
 
 /// A rectangle of pixels; row 0 is at the top.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -224,10 +224,10 @@ pub struct Frame {
     /// Rows.
     pub height: usize,
     /// Premultiplied RGBA, row by row from the top, background not included.
-    pub color: Vec<[f32; 4]>,
+    pub color: Pixels<[f32; 4]>,
     /// World distance along the ray at which accumulated opacity first reaches the threshold;
     /// infinite where it never does.
-    pub depth: Vec<f32>,
+    pub depth: Pixels<f32>,
     /// The background to lay under it: straight RGBA.
     pub background: [f32; 4],
     /// Warnings that arose.
@@ -245,8 +245,8 @@ impl Frame {
         Self {
             width: desc.width,
             height: desc.height,
-            color: vec![[0.0; 4]; pixels],
-            depth: vec![f32::INFINITY; pixels],
+            color: vec![[0.0; 4]; pixels].into(),
+            depth: vec![f32::INFINITY; pixels].into(),
             background: desc.background,
             warnings: Vec::new(),
             method: Method::default(),

@@ -24,6 +24,9 @@ pub mod names;
 pub mod null;
 pub mod opaque;
 pub mod parameter;
+pub mod pixels;
+#[expect(unsafe_code, reason = "what crosses to plugins is C")]
+pub mod plugin;
 pub mod registry;
 pub mod resolve;
 pub mod scene;
@@ -50,6 +53,7 @@ pub use loader::{LoadError, LoadOptions, Loader, Progress, Region, VolumeReader}
 pub use mesh_data::{Data, MeshData};
 pub use opaque::{Opaque, OpaqueDepth};
 pub use parameter::{Declaration, ParameterDecl, ParameterType, ParameterValue};
+pub use pixels::Pixels;
 pub use registry::Registry;
 pub use shader::{Compositing, ShaderEntry, ShaderText};
 pub use shader_file::ShaderFile;

@@ -178,6 +178,14 @@ pub enum LoadError {
         /// Why.
         source: Box<dyn std::error::Error + Send + Sync>,
     },
+    /// A plugin failed.
+    #[error("{}: cannot be read", path.display())]
+    Plugin {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: crate::plugin::PluginError,
+    },
     /// The volume that the header describes cannot be.
     #[error("{}: describes no volume", path.display())]
     Volume {

@@ -7,7 +7,8 @@ use thiserror::Error;
 
 use crate::{
     ActionError, Block, Context, Cylinder, Data, Declaration, Geometry, LoadError, LoadOptions, Loader, MeshData,
-    Options, ParameterDecl, ParameterType, ParameterValue, Progress, RenderAction, ShaderEntry, Sphere, Volume,
+    Options, ParameterDecl, ParameterType, ParameterValue, Progress, RenderAction, ShaderEntry, ShaderText, Sphere,
+    Volume,
     action::Watch,
     checked::{self, CheckedAction},
     geometry::GeometryError,
@@ -54,6 +55,7 @@ pub struct Registry {
     geometries: BTreeMap<String, (Declaration, GeometryFactory)>,
     loaders: Vec<Arc<dyn Loader>>,
     shaders: ShaderCatalog,
+    origins: BTreeMap<(Kind, String), String>,
     progress: Watch,
 }
 
@@ -124,6 +126,51 @@ impl Registry {
         check_name(&entry.declaration, Kind::Shader, taken)?;
         self.shaders.insert(entry);
         Ok(())
+    }
+
+    /// Registers a shader with its source in WGSL.
+    ///
+    /// # Errors
+    /// As [`add_action`](Self::add_action).
+    pub fn add_shader_source(&mut self, entry: ShaderEntry, source: impl Into<String>) -> Result<(), RegisterError> {
+        let file = format!("{}.wgsl", entry.declaration.name);
+        self.add_shader(ShaderEntry { source: Some(Arc::new(ShaderText { file, text: source.into() })), ..entry })
+    }
+
+    /// The source in WGSL that a shader was registered with.
+    pub fn shader_source(&self, name: &str) -> Option<&str> {
+        Some(&self.shaders.get(name)?.source.as_ref()?.text)
+    }
+
+    /// The plugin that registered a name; `None` for built-ins and the application's own.
+    pub fn origin(&self, kind: Kind, name: &str) -> Option<&str> {
+        self.origins.get(&(kind, name.to_owned())).map(String::as_str)
+    }
+
+    pub(crate) fn set_origin(&mut self, kind: Kind, name: &str, plugin: &str) {
+        self.origins.insert((kind, name.to_owned()), plugin.to_owned());
+    }
+
+    pub(crate) fn declaration(&self, kind: Kind, name: &str) -> Option<&Declaration> {
+        self.declarations().into_iter().find(|d| d.kind == kind && d.name == name)
+    }
+
+    pub(crate) fn remove(&mut self, kind: Kind, name: &str) {
+        match kind {
+            Kind::Action => _ = self.actions.remove(name),
+            Kind::Geometry => _ = self.geometries.remove(name),
+            Kind::Loader => self.loaders.retain(|l| l.declaration().name != name),
+            Kind::Shader => _ = self.shaders.remove(name),
+        }
+        self.origins.remove(&(kind, name.to_owned()));
+    }
+
+    pub(crate) fn actions(&self) -> impl Iterator<Item = &(Declaration, ActionFactory)> {
+        self.actions.values()
+    }
+
+    pub(crate) fn geometries(&self) -> impl Iterator<Item = &(Declaration, GeometryFactory)> {
+        self.geometries.values()
     }
 
     /// All declarations, by kind and name.

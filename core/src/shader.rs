@@ -81,6 +81,10 @@ impl ShaderCatalog {
         true
     }
 
+    pub(crate) fn remove(&mut self, name: &str) {
+        Arc::make_mut(&mut self.0).remove(name);
+    }
+
     /// The shader of that name.
     pub fn get(&self, name: &str) -> Option<&Arc<ShaderEntry>> {
         self.0.get(name)

@@ -184,6 +184,14 @@ impl LookupTable {
         }
     }
 
+    /// The equidistant entries and their domain, where the table has such.
+    pub(crate) fn uniform(&self) -> Option<(&Buffer, Option<[f64; 2]>)> {
+        match &self.entries {
+            Entries::Uniform { data, domain } => Some((data, *domain)),
+            Entries::Points(_) => None,
+        }
+    }
+
     /// The table as control points in rising order, for a texture of this value `range`.
     pub fn points(&self, range: [f64; 2]) -> Vec<ControlPoint> {
         match &self.entries {

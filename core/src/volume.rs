@@ -578,6 +578,12 @@ impl VolumeTexture {
         self.geometry_roi.unwrap_or_else(|| roi_extent(&self.data_roi, self.volume.desc().spacing))
     }
 
+    /// The range where it is known without a look at the voxels.
+    pub(crate) fn known_range(&self) -> Option<[f64; 2]> {
+        let known = self.range.is_some() || self.volume.desc().scalar.limits().is_some();
+        known.then(|| self.range())
+    }
+
     /// The values, in data units, that a shader sees as 0 and 1: as set, else the whole range of
     /// an integer type (after slope and intercept), else the data's own finite range, `[0, 1]`
     /// where that is empty, and one unit wide where it is a single value.

@@ -32,6 +32,8 @@ pub enum WarningCode {
     FileContent,
     /// Pixels whose certificate is wider than asked.
     NotCertified,
+    /// What a plugin says under a code of its own.
+    Plugin,
 }
 
 impl WarningCode {
@@ -45,6 +47,7 @@ impl WarningCode {
             Self::SettingAdjusted => "setting-adjusted",
             Self::FileContent => "file-content",
             Self::NotCertified => "not-certified",
+            Self::Plugin => "plugin",
         }
     }
 }

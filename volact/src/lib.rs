@@ -29,6 +29,7 @@
 
 pub mod metrics;
 pub mod save;
+pub mod shaders;
 pub mod transfer;
 
 pub use volact_core as core;
@@ -59,12 +60,14 @@ impl RegistryExt for Registry {
     }
 }
 
-/// A registry of everything that comes with Volact: core, the CPU actions and all loaders.
+/// A registry of everything that comes with Volact: core, the CPU actions, all loaders, and
+/// shaders by their source.
 pub fn with_builtins() -> Registry {
     let mut registry = Registry::with_core();
     volact_cpu::register(&mut registry).expect("the names of built-ins are free");
     for loader in volact_files::loaders() {
         registry.add_loader(loader).expect("the names of built-ins are free");
     }
+    shaders::add_builtin(&mut registry).expect("the names of built-ins are free");
     registry
 }

@@ -15,7 +15,8 @@ use commands::Command;
 #[derive(Parser)]
 #[command(name = "volact", version, about = "Draw volumes: describe once, draw with any action", max_term_width = 100)]
 #[command(after_help = "Exit codes: 0 fine, 1 pictures differ, 2 failed.\n\
-    VOLACT_LOG sets what is logged (e.g. `debug` or `volact_cpu=trace`), VOLACT_CONFIG names the config file.")]
+    VOLACT_LOG sets what is logged (e.g. `debug` or `volact_cpu=trace`), VOLACT_CONFIG names the config file,\n\
+    VOLACT_PLUGIN_PATH folders of plugins, searched after the config's.")]
 struct Cli {
     /// Say more: -v what is done, -vv settings, -vvv everything
     #[arg(short, long, action = clap::ArgAction::Count, global = true, conflicts_with = "quiet")]

@@ -168,7 +168,7 @@ fn truth(scene: &Scene, registry: &Registry) -> Vec<[f32; 4]> {
     let mut frame = scene.frame.clone();
     (frame.width, frame.height) = (24, 20);
     let scene = Scene { shapes: scene.shapes.clone(), frame, action: None };
-    draw(&scene, "reference", Options::new(), registry).color
+    draw(&scene, "reference", Options::new(), registry).color.into_vec()
 }
 
 /// The greatest difference at each pixel.

@@ -2,6 +2,8 @@
 
 mod check;
 mod mesh_peers;
+mod header;
+mod new_plugin;
 mod peer;
 mod peer_scene;
 mod peers;
@@ -28,6 +30,10 @@ enum Task {
     Peers(peers::Args),
     /// Compare with VTK's mappers of unstructured grids on real meshes, in turn, and write the table.
     MeshPeers(mesh_peers::Args),
+    /// Generate the C header of the plugin boundary.
+    Header,
+    /// Make a plugin's crate that builds, tests itself and draws something.
+    NewPlugin(new_plugin::Args),
     /// Time `cpu` over picture sizes, volume sizes and threads.
     Scaling,
 }
@@ -39,6 +45,8 @@ fn main() -> anyhow::Result<()> {
         Task::Peer(args) => peer::run(&args),
         Task::Peers(args) => peers::run(&args),
         Task::MeshPeers(args) => mesh_peers::run(&args),
+        Task::Header => header::run(),
+        Task::NewPlugin(args) => new_plugin::run(&args),
         Task::Scaling => scaling::run(),
     }
 }

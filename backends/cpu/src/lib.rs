@@ -2,6 +2,9 @@
 //!
 //! - [`mod@reference`]: f64, cell by cell, with an enclosure for each pixel. Slow, plain and right.
 //! - [`fast`]: the action `cpu`: f32, all cores, the widest vector unit found.
+//!
+//! The crate is a plugin, too: [`volact_plugin()`] is its entry for hosts that link it, and
+//! `cargo rustc -p volact-cpu --release --crate-type cdylib` makes a library to load.
 
 pub mod fast;
 pub mod reference;
@@ -16,3 +19,5 @@ pub fn register(registry: &mut Registry) -> Result<(), RegisterError> {
     reference::register(registry)?;
     fast::register(registry)
 }
+
+volact_plugin::export!(register);

@@ -26,6 +26,13 @@ impl Plane {
         Ok(Self { normal, offset: normal.dot(point) })
     }
 
+    /// A plane of numbers that another plane had; `None` where they are none.
+    pub(crate) fn from_numbers([x, y, z, offset]: [f64; 4]) -> Option<Self> {
+        let normal = DVec3::new(x, y, z);
+        let good = (normal.length_squared() - 1.0).abs() <= 1e-9 && offset.is_finite();
+        good.then_some(Self { normal, offset })
+    }
+
     /// The unit normal.
     pub fn normal(&self) -> DVec3 {
         self.normal
@@ -65,6 +72,11 @@ impl ClipRegion {
     /// Keeps what is in front of all planes.
     pub fn planes(planes: impl IntoIterator<Item = Plane>) -> Self {
         Self { planes: planes.into_iter().collect(), keep: true }
+    }
+
+    /// A region of planes that keeps its inside, or its outside.
+    pub(crate) fn from_planes(planes: Vec<Plane>, keep: bool) -> Self {
+        Self { planes, keep }
     }
 
     /// Keeps the inside of a box: a crop box.

@@ -143,6 +143,11 @@ impl Mesh {
         &self.points
     }
 
+    /// The types of the cells.
+    pub fn types(&self) -> &CellTypes {
+        &self.types
+    }
+
     /// The indices of all cells' corners, as `u32`.
     pub fn connectivity(&self) -> &Buffer {
         &self.connectivity

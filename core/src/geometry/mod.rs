@@ -38,6 +38,9 @@ pub use tessellation::Tessellation;
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum GeometryError {
+    /// A plugin failed.
+    #[error(transparent)]
+    Plugin(#[from] crate::plugin::PluginError),
     /// A number out of bounds.
     #[error("geometry {geometry:?}: {what} is {found}, wanted {wanted}")]
     Invalid {

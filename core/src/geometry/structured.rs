@@ -74,6 +74,16 @@ impl StructuredMesh {
         &self.points
     }
 
+    /// The blanking flags, one a vertex.
+    pub fn blanked(&self) -> Option<&Buffer> {
+        self.blanked.as_ref()
+    }
+
+    /// The texture coordinates.
+    pub fn texture_coordinates(&self) -> Option<&Points> {
+        self.texture_coordinates.as_ref()
+    }
+
     /// All cells that are not blanked: their corners in the order of
     /// [`CellType::Hexahedron`].
     pub fn cells(&self) -> impl Iterator<Item = [u32; 8]> {

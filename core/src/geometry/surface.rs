@@ -63,6 +63,11 @@ impl Surface {
         self.triangles.as_slice().unwrap_or_default()
     }
 
+    /// The triangles as they are kept: three `u32` each.
+    pub fn triangle_data(&self) -> &Buffer {
+        &self.triangles
+    }
+
     /// The vertices' normals.
     pub fn normals(&self) -> Option<&Points> {
         self.normals.as_ref()

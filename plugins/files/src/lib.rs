@@ -13,6 +13,9 @@
 //!   a mapped file where it has them raw, aligned and in native byte order.
 //! - Memory is taken for what a file can hold, never on the word of a header.
 //! - World space of medical formats is LPS.
+//!
+//! The crate is a plugin, too: [`volact_plugin()`] is its entry for hosts that link it, and
+//! `cargo rustc -p volact-files --release --crate-type cdylib` makes a library to load.
 
 mod decode;
 mod dicom;
@@ -52,7 +55,9 @@ mod world;
 
 use std::{path::Path, sync::Arc};
 
-use volact_core::{LoadError, LoadOptions, Loader, MeshData, Progress, VolumeReader, names};
+use volact_core::{
+    LoadError, LoadOptions, Loader, MeshData, Progress, Registry, VolumeReader, names, registry::RegisterError,
+};
 
 pub use storage::Storage;
 
@@ -85,6 +90,14 @@ fn formats() -> Vec<Format> {
 /// of meshes vtk-mesh, vtu, vts, vtp, plot3d, exodus, obj, ply and stl.
 pub fn loaders() -> Vec<Arc<dyn Loader>> {
     formats().into_iter().map(|format| Arc::new(format) as Arc<dyn Loader>).collect()
+}
+
+/// Registers all loaders of this crate.
+///
+/// # Errors
+/// If a name is taken.
+pub fn register(registry: &mut Registry) -> Result<(), RegisterError> {
+    loaders().into_iter().try_for_each(|loader| registry.add_loader(loader))
 }
 
 /// Opens a file of a [`Storage`] with the loader of that name, as [`Loader::open`] does on disk.
@@ -131,3 +144,5 @@ fn resolve(loader: &str, options: &LoadOptions) -> Result<(Format, LoadOptions),
     })?;
     Ok((format, options))
 }
+
+volact_plugin::export!(register);

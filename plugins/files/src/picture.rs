@@ -52,7 +52,7 @@ pub struct Picture {
 /// # Errors
 /// If the file cannot be written or the frame's size does not fit its pixels.
 pub fn save_png(path: &Path, frame: &Frame, options: PngOptions) -> Result<(), LoadError> {
-    let pixels = if options.over_background { frame.over_background() } else { frame.color.clone() };
+    let pixels = if options.over_background { frame.over_background() } else { frame.color.to_vec() };
     write_png(path, frame.width, frame.height, &pixels, options.sixteen_bit)
 }
 

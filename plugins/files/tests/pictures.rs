@@ -9,7 +9,7 @@ fn frame(color: Vec<[f32; 4]>, width: usize, background: [f32; 4]) -> Frame {
     let camera = Camera::orthographic(DVec3::Z, DVec3::ZERO, DVec3::Y, 1.0);
     let height = color.len() / width;
     let mut frame = Frame::empty(&FrameDesc::new(camera, width, height).with_background(background));
-    frame.color = color;
+    frame.color = color.into();
     frame
 }
 

@@ -270,7 +270,7 @@ fn checked_finds_a_faulty_action() {
         (|f| f.color[1] = [f32::INFINITY, 0.0, 0.0, 1.0], "pixel (1, 0)"),
         (|f| f.depth[2] = f32::NAN, "depth of pixel (2, 0)"),
         (|f| f.width += 1, "wanted 12 × 12"),
-        (|f| f.color.truncate(5), "wanted 12 × 12"),
+        (|f| f.color = f.color[..5].to_vec().into(), "wanted 12 × 12"),
     ];
     for (fault, words) in faults {
         let error = draw(&mut wrapped(fault), std::slice::from_ref(&shape), &desc).unwrap_err();

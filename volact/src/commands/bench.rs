@@ -2,6 +2,7 @@
 
 use std::{
     fmt::Write as _,
+    path::{Path, PathBuf},
     process::ExitCode,
     time::{Duration, Instant},
 };
@@ -35,6 +36,18 @@ pub struct Args {
     /// Print JSON
     #[arg(long)]
     json: bool,
+}
+
+impl Args {
+    /// The config file that is named.
+    pub fn config(&self) -> Option<PathBuf> {
+        self.source.config.clone()
+    }
+
+    /// The scene file, if it is one that is drawn.
+    pub fn scene(&self) -> Option<&Path> {
+        Some(self.source.input.as_path()).filter(|path| path.extension().is_some_and(|e| e == "ron"))
+    }
 }
 
 /// What a table or a JSON says above its rows.

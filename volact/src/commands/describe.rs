@@ -53,6 +53,12 @@ fn list(all: &[&Declaration]) -> String {
 
 fn full(d: &Declaration, registry: &Registry) -> String {
     let mut text = format!("{} {} {}\n  {}\n", d.kind.name(), d.name, d.version, d.description);
+    if let Some(plugin) = registry.origin(d.kind, &d.name) {
+        _ = writeln!(text, "  by plugin {plugin}");
+    }
+    if d.kind == Kind::Action {
+        text.push_str(&capabilities(&d.name, registry));
+    }
     if let Some(shader) = registry.shaders().get(&d.name).filter(|_| d.kind == Kind::Shader) {
         _ = writeln!(text, "  composited by {}", shader.compositing.name());
     }
@@ -63,6 +69,27 @@ fn full(d: &Declaration, registry: &Registry) -> String {
         _ = writeln!(text, "\n  {what}s");
         d.parameters.iter().for_each(|p| text.push_str(&parameter(p)));
     }
+    text
+}
+
+/// What an action can do, where it can be made with its defaults.
+fn capabilities(name: &str, registry: &Registry) -> String {
+    let Ok(action) = registry.action(name, &volact::Options::new()) else { return String::new() };
+    let caps = action.caps();
+    let some = |names: &Option<Vec<String>>| names.as_ref().map_or_else(|| "any".to_owned(), |names| names.join(", "));
+    let compositing = caps.compositing.iter().map(|c| c.name()).collect::<Vec<_>>().join(", ");
+    let mut text = String::new();
+    _ = writeln!(text, "  shaders: {}", some(&caps.shaders));
+    _ = writeln!(text, "  geometries: {}", some(&caps.geometries));
+    _ = writeln!(text, "  compositing: {}", if compositing.is_empty() { "none" } else { &compositing });
+    let yes = |can: bool| if can { "yes" } else { "no" };
+    _ = writeln!(
+        text,
+        "  overlapping shapes: {}; depth: {}; runs on {}",
+        yes(caps.overlap),
+        yes(caps.depth),
+        caps.device
+    );
     text
 }
 

@@ -8,6 +8,7 @@ pub mod completions;
 pub mod cuts;
 pub mod describe;
 pub mod info;
+pub mod plugins;
 pub mod progress;
 pub mod render;
 pub mod report;
@@ -16,6 +17,7 @@ pub mod source;
 
 use std::{
     io::Write,
+    path::Path,
     process::ExitCode,
     sync::atomic::{AtomicBool, Ordering},
 };
@@ -31,6 +33,8 @@ pub enum Command {
     Info(info::Args),
     /// List all actions, shaders, geometries and loaders, or describe one in full
     Describe(describe::Args),
+    /// List the plugins that are found, what they register, and what was refused and why
+    Plugins(plugins::Args),
     /// Compare two pictures; exits with 1 where they differ by more than a threshold
     Compare(compare::Args),
     /// Measure how fast a scene is drawn
@@ -46,14 +50,53 @@ impl Command {
         leave_nothing_half_done();
         let mut registry = volact::with_builtins();
         registry.set_progress(progress::watch());
+        let plugins = self.load_plugins(&mut registry)?;
+        self.load_shaders(&mut registry)?;
         match self {
             Self::Render(args) => render::run(args, &registry),
             Self::Info(args) => info::run(args, &registry),
             Self::Describe(args) => describe::run(args, &registry),
+            Self::Plugins(args) => match plugins {
+                Some(plugins) => plugins::run(args, &plugins),
+                None => Ok(ExitCode::SUCCESS),
+            },
             Self::Compare(args) => compare::run(args, &registry),
             Self::Bench(args) => bench::run(args, &registry),
             Self::Completions(args) => completions::run(args, &registry),
         }
+    }
+}
+
+impl Command {
+    /// Registers the shaders of the config's folders, and those beside the scene.
+    fn load_shaders(&self, registry: &mut volact::Registry) -> anyhow::Result<()> {
+        let (named, scene) = match self {
+            Self::Render(args) => (args.config(), args.scene()),
+            Self::Bench(args) => (args.config(), args.scene()),
+            Self::Describe(_) => (None, None),
+            _ => return Ok(()),
+        };
+        for folder in settings::config(named)?.shader_folders {
+            volact::shaders::add_folder(registry, &folder)?;
+        }
+        match scene.and_then(Path::parent) {
+            Some(beside) if beside.as_os_str().is_empty() => volact::shaders::add_folder(registry, Path::new("."))?,
+            Some(beside) if beside.is_dir() => volact::shaders::add_folder(registry, beside)?,
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// Loads the plugins of the config in force, for commands that could use them.
+    fn load_plugins(&self, registry: &mut volact::Registry) -> anyhow::Result<Option<plugins::Plugins>> {
+        let named = match self {
+            Self::Render(args) => args.config(),
+            Self::Bench(args) => args.config(),
+            Self::Info(_) | Self::Describe(_) | Self::Plugins(_) => None,
+            Self::Compare(_) | Self::Completions(_) => return Ok(None),
+        };
+        let loudly = !matches!(self, Self::Plugins(_));
+        plugins::Plugins::load(named, registry, loudly).map(Some)
     }
 }
 

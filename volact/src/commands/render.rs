@@ -64,6 +64,16 @@ pub fn run(args: Args, registry: &Registry) -> anyhow::Result<ExitCode> {
 }
 
 impl Args {
+    /// The config file that is named.
+    pub fn config(&self) -> Option<PathBuf> {
+        self.source.config.clone()
+    }
+
+    /// The scene file, if it is one that is drawn.
+    pub fn scene(&self) -> Option<&Path> {
+        Some(self.source.input.as_path()).filter(|path| path.extension().is_some_and(|e| e == "ron"))
+    }
+
     /// What a PNG shall be; all that can be said before drawing is said here.
     fn png(&self, output: &Path) -> anyhow::Result<PngOptions> {
         let format = PictureFormat::of(output)?;
