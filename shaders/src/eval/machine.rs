@@ -249,18 +249,18 @@ fn step<F: Real>(inst: &Inst, floats: &mut [Vec<F>], bits: &mut [Vec<u32>], n: u
             choose(floats, &bits[*condition as usize][..n], n, *to, *accept, *reject);
         }
         Inst::Select { class: Class::Bits, to, condition, accept, reject } => {
-            map3(bits, n, *to, [*condition, *accept, *reject], |c, a, b| if c != 0 { a } else { b });
+            map3(bits, n, *to, [*condition, *accept, *reject], choose_bits);
         }
         Inst::Copy { class: Class::Float, to, from } => map1(floats, n, *to, *from, |x| x),
         Inst::Copy { class: Class::Bits, to, from } => map1(bits, n, *to, *from, |x| x),
         Inst::Blend { class: Class::Float, to, mask, from } => {
             let mut row = take(&mut floats[*to as usize]);
-            blend(&mut row[..n], &bits[*mask as usize][..n], &floats[*from as usize][..n]);
+            blend(&mut row[..n], &bits[*mask as usize][..n], &floats[*from as usize][..n], F::choose);
             floats[*to as usize] = row;
         }
         Inst::Blend { class: Class::Bits, to, mask, from } => {
             let mut row = take(&mut bits[*to as usize]);
-            blend(&mut row[..n], &bits[*mask as usize][..n], &bits[*from as usize][..n]);
+            blend(&mut row[..n], &bits[*mask as usize][..n], &bits[*from as usize][..n], choose_bits);
             bits[*to as usize] = row;
         }
         Inst::Gather { class: Class::Float, to, index, from } => {
@@ -342,13 +342,19 @@ fn choose<F: Real>(floats: &mut [Vec<F>], condition: &[u32], n: usize, to: Reg, 
     let mut row = take(&mut floats[to as usize]);
     let (a, b) = (&floats[accept as usize][..n], &floats[reject as usize][..n]);
     let lanes = row[..n].iter_mut().zip(condition).zip(a).zip(b);
-    lanes.for_each(|(((to, c), a), b)| *to = if *c != 0 { *a } else { *b });
+    lanes.for_each(|(((to, c), a), b)| *to = F::choose(*c, *a, *b));
     floats[to as usize] = row;
 }
 
 #[inline(always)]
-fn blend<T: Copy>(to: &mut [T], mask: &[u32], from: &[T]) {
-    to.iter_mut().zip(mask).zip(from).for_each(|((to, m), from)| *to = if *m != 0 { *from } else { *to });
+fn blend<T: Copy>(to: &mut [T], mask: &[u32], from: &[T], choose: impl Fn(u32, T, T) -> T) {
+    to.iter_mut().zip(mask).zip(from).for_each(|((to, m), from)| *to = choose(*m, *from, *to));
+}
+
+/// As [`Real::choose`] for integers and truth values.
+#[inline(always)]
+fn choose_bits(mask: u32, accept: u32, reject: u32) -> u32 {
+    (accept & mask) | (reject & !mask)
 }
 
 fn gather<T: Copy>(to: &mut [T], index: &[u32], from: &[Reg], rows: &[Vec<T>]) {

@@ -118,7 +118,7 @@ pub fn float1<F: Real>(op: Float1, x: F) -> F {
         Float1::Log2 => x.log2(),
         // Neither above nor below zero: zero, or NaN, which is told on.
         Float1::Sign => select(x > zero, one, select(x < zero, -one, x)),
-        Float1::Saturate => float3(Float3::Clamp, x, zero, one),
+        Float1::Saturate => clamp(x, zero, one),
         Float1::Radians => x * F::from_f64(std::f64::consts::PI / 180.0),
         Float1::Degrees => x * F::from_f64(180.0 / std::f64::consts::PI),
         Float1::Frexp => x.frexp().0,
@@ -150,13 +150,20 @@ pub fn float3<F: Real>(op: Float3, x: F, y: F, z: F) -> F {
     let one = F::from_f32(1.0);
     match op {
         Float3::Fma => x.mul_add(y, z),
-        Float3::Clamp => float2(Float2::Min, float2(Float2::Max, x, y), z),
+        Float3::Clamp => clamp(x, y, z),
         Float3::Mix => x * (one - z) + y * z,
         Float3::SmoothStep => {
-            let t = float3(Float3::Clamp, (z - x) / (y - x), F::from_f32(0.0), one);
+            let t = clamp((z - x) / (y - x), F::from_f32(0.0), one);
             t * t * (F::from_f32(3.0) - F::from_f32(2.0) * t)
         }
     }
+}
+
+/// A function of its own: one that calls itself is not taken into the loops over rows.
+#[inline(always)]
+fn clamp<F: Real>(x: F, low: F, high: F) -> F {
+    let x = select(x < low, low, x);
+    select(high < x, high, x)
 }
 
 #[inline(always)]

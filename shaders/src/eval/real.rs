@@ -40,6 +40,9 @@ pub trait Real:
     fn to_u32(self) -> u32;
     /// All bits, by which constants are told apart.
     fn bits(self) -> u64;
+    /// The one where all bits of the mask are set, the other where none is: without a branch, which
+    /// keeps loops over rows from being vectorised.
+    fn choose(mask: u32, accept: Self, reject: Self) -> Self;
     /// `self · 2^exponent`, rounded once.
     fn ldexp(self, exponent: i32) -> Self;
     /// The fraction of magnitude in [0.5, 1) and the exponent such that `fraction · 2^exponent`
@@ -157,6 +160,13 @@ macro_rules! real {
             #[inline(always)]
             fn bits(self) -> u64 {
                 u64::from(self.to_bits())
+            }
+
+            #[inline(always)]
+            fn choose(mask: u32, accept: Self, reject: Self) -> Self {
+                // A mask of the type's own width, by its sign.
+                let mask = i64::from(mask as i32) as $bits;
+                Self::from_bits((accept.to_bits() & mask) | (reject.to_bits() & !mask))
             }
 
             fn ldexp(self, exponent: i32) -> Self {
