@@ -286,6 +286,19 @@ fn too_much_code_is_refused() {
     assert!(error.contains("with all functions inlined, more than 65536 instructions"), "{error}");
 }
 
+/// Thousands of loops, all inlined: large, but within bounds and soon ready.
+#[test]
+fn many_loops_are_lowered() {
+    let mut text =
+        String::from("fn g0(x: f32) -> f32 { var y = x; for (var i = 0; i < 2; i++) { y += 1.0; } return y; }\n");
+    for i in 1..12 {
+        let before = i - 1;
+        text += &format!("fn g{i}(x: f32) -> f32 {{ return g{before}(g{before}(x)); }}\n");
+    }
+    text += "fn shade(s: Sample) -> Medium { return Medium(vec3(g11(s.position.x)), 0.0); }";
+    check(&text, &grid()[..3], |[x, ..]| [x + 4096.0, x + 4096.0, x + 4096.0, 0.0]);
+}
+
 proptest! {
     /// Batches of any length give what single samples give.
     #[test]

@@ -109,10 +109,11 @@ fn spans(code: &[Inst], inputs: &[(Input, Reg)], outputs: &[Reg]) -> HashMap<Reg
     for reg in outputs {
         spans.entry(*reg).or_insert((0, 0)).1 = code.len() + 1;
     }
+    let mut spans: Vec<(Reg, Span)> = spans.into_iter().collect();
     // Inner loops end first, so that what they lengthen is seen by the outer ones.
     for (head, back) in loops(code) {
         let (head, back) = (head + 1, back + 1);
-        for (begin, end) in spans.values_mut() {
+        for (_, (begin, end)) in &mut spans {
             if *begin < head && (head..=back).contains(end) {
                 *end = back;
             } else if (head..=back).contains(begin) && *end > back {
@@ -120,5 +121,5 @@ fn spans(code: &[Inst], inputs: &[(Input, Reg)], outputs: &[Reg]) -> HashMap<Reg
             }
         }
     }
-    spans
+    spans.into_iter().collect()
 }
