@@ -118,7 +118,8 @@ impl Config {
 }
 
 fn read(reader: &mut Reader, at: &At) -> Option<Config> {
-    let known = ["version", "prefer", "options", "image", "view", "shader_folders", "plugins", "plugin_folders", "names"];
+    let known =
+        ["version", "prefer", "options", "image", "view", "shader_folders", "plugins", "plugin_folders", "names"];
     let fields = reader.fields(at, &["Config"], &known)?;
     reader.version(&fields, CONFIG_VERSION);
     let mut config = Config::default();

@@ -1,8 +1,8 @@
 //! What people who work on Volact repeat: `cargo xtask --help`.
 
 mod check;
-mod mesh_peers;
 mod header;
+mod mesh_peers;
 mod new_plugin;
 mod peer;
 mod peer_scene;

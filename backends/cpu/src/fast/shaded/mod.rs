@@ -12,7 +12,7 @@ mod surroundings;
 use std::sync::{Mutex, OnceLock, PoisonError};
 
 use volact_core::{
-    ActionError, Compositing, ParameterType, ParameterValue,
+    ActionError, Compositing, ParameterType, ParameterValue, TableInterpolation,
     glam::{DAffine3, DVec3},
     parameter::ParameterMap,
     resolve::ResolvedShape,
@@ -53,6 +53,11 @@ pub fn refused(shape: &ResolvedShape) -> Option<(String, &'static str)> {
     }
     if geometry.slices().is_some() {
         return Some((format!("slice planes with shader {name:?}"), "draw them with a built-in shader, such as lut"));
+    }
+    let before =
+        |v: &ParameterValue| matches!(v, ParameterValue::Table(t) if t.interpolation() == TableInterpolation::Pre);
+    if shape.parameters.values().any(before) {
+        return Some((format!("a pre-interpolated table in shader {name:?}"), "let it apply after interpolation"));
     }
     if shape.parameters.values().any(|v| v.kind() == ParameterType::Attribute) {
         let what = format!("attributes of vertices in shader {name:?}");
