@@ -213,6 +213,22 @@ fn loading_twice_gives_one_library() {
     assert_eq!(first.declarations(), second.declarations());
 }
 
+/// The example of the documentation, as a reader would copy it.
+#[test]
+fn documented_plugin_compiles_and_loads() {
+    let text = fs::read_to_string(common::root().join("docs/plugins.md")).unwrap();
+    let code = text.split("```c\n").nth(1).unwrap().split("```").next().unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let source = folder.path().join("corner.c");
+    fs::write(&source, code).unwrap();
+    let library = folder.path().join(volact_plugin::plugin::host::file_name("corner"));
+    common::compile(&source, &library, &["-Wno-unused-parameter", "-Wno-missing-field-initializers"]);
+    let mut registry = Registry::new();
+    common::load(folder.path(), "corner", &mut registry).unwrap();
+    let corner = registry.geometry("corner", &ParameterMap::new()).unwrap();
+    assert!((corner.tessellate().unwrap().volume(0) - 1.0 / 6.0).abs() < 1e-15);
+}
+
 fn denormals_live() -> bool {
     let tiny = std::hint::black_box(f32::MIN_POSITIVE);
     tiny * std::hint::black_box(0.5f32) > 0.0

@@ -78,7 +78,7 @@ fn block() -> Shape {
 fn blocks_are_the_same() {
     let shape = block();
     let desc = FrameDesc::fit(&shape, View::Iso, 24, 20);
-    same("table", &[shape.clone()], &desc);
+    same("table", std::slice::from_ref(&shape), &desc);
     let mip = Shape::around(&volume(), Appearance::new("mip"));
     same("two shapes", &[shape.clone(), mip], &desc);
     let plane = Plane::new(DVec3::new(2.0, 2.1, 2.2), DVec3::new(0.3, -1.0, 0.4)).unwrap();
@@ -161,7 +161,7 @@ fn refusals_have_the_same_words() {
     let shape = Shape::around(&volume(), Appearance::new("surface"));
     let desc = FrameDesc::fit(&block(), View::Front, 4, 4);
     let [wanted, found] = [&direct, &behind].map(|registry| {
-        let error = draw(registry, "cpu", &[shape.clone()], &desc).unwrap_err();
+        let error = draw(registry, "cpu", std::slice::from_ref(&shape), &desc).unwrap_err();
         let mut words = error.to_string();
         let mut cause = std::error::Error::source(&error);
         while let Some(inner) = cause {
@@ -231,7 +231,7 @@ fn tiny(folder: &Path) -> Frame {
     // Opacities so small that products with them are denormal.
     let faint = LookupTable::window_level(250.0, 125.0, 1e-37).unwrap();
     shape.set_parameter("lookup_table", faint);
-    draw(&registry, "cpu", &[shape.clone()], &FrameDesc::fit(&shape, View::Front, 24, 20)).unwrap()
+    draw(&registry, "cpu", std::slice::from_ref(&shape), &FrameDesc::fit(&shape, View::Front, 24, 20)).unwrap()
 }
 
 #[test]

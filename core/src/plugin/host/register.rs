@@ -65,7 +65,10 @@ pub unsafe fn load(search: &Search, registry: &mut Registry) -> Vec<Outcome> {
     }
     // A name that the config gives to a plugin must be one that it has.
     for (name, plugin) in &search.names {
-        let Some(outcome) = all.iter_mut().find(|o| o.name == *plugin) else { continue };
+        let Some(outcome) = all.iter().find(|o| o.name == *plugin) else {
+            log::warn!("the config gives {name:?} to {plugin:?}, which is none of its plugins");
+            continue;
+        };
         let has = |loaded: &Loaded| loaded.registered.iter().any(|r| r.name == *name);
         if outcome.result.as_ref().is_ok_and(|loaded| !has(loaded)) {
             log::warn!("the config gives {name:?} to plugin {plugin:?}, which does not register it");
