@@ -160,7 +160,7 @@ impl Registry {
             Kind::Action => _ = self.actions.remove(name),
             Kind::Geometry => _ = self.geometries.remove(name),
             Kind::Loader => self.loaders.retain(|l| l.declaration().name != name),
-            Kind::Shader => _ = self.shaders.remove(name),
+            Kind::Shader => self.shaders.remove(name),
         }
         self.origins.remove(&(kind, name.to_owned()));
     }
