@@ -1,4 +1,5 @@
 //! What programs ask for: volumes at places in local space, and tables.
+#![expect(clippy::needless_range_loop, reason = "a lane or axis indexes several arrays")]
 
 use volact_core::{
     ParameterValue, Roi, VolumeTexture,
