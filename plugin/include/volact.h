@@ -1040,6 +1040,14 @@ typedef struct VolactCapsView {
    What it runs on.
    */
   struct VolactText device;
+  /*
+   Whether it draws shaders by their source that `shaders` does not name.
+   */
+  uint32_t shader_sources;
+  /*
+   0.
+   */
+  uint32_t reserved;
 } VolactCapsView;
 
 /*
@@ -1058,6 +1066,14 @@ typedef struct VolactKnownShader {
    0.
    */
   uint32_t reserved;
+  /*
+   The file of the source, as messages name it; without length where there is none.
+   */
+  struct VolactText file;
+  /*
+   The source in WGSL; without length where there is none.
+   */
+  struct VolactText source;
 } VolactKnownShader;
 
 /*

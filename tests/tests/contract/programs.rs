@@ -19,7 +19,7 @@ fn with(shaders: &[(&str, Vec<ParameterDecl>, &str)]) -> Registry {
     let mut all = registry();
     for (name, parameters, text) in shaders {
         let declaration =
-            Declaration { parameters: parameters.clone(), ..Declaration::new(Kind::Shader, *name, "0", "a test") };
+            Declaration { parameters: parameters.clone(), ..Declaration::new(Kind::Shader, name, "0", "a test") };
         let source = Some(Arc::new(ShaderText { file: format!("{name}.wgsl"), text: (*text).into() }));
         all.add_shader(ShaderEntry { declaration, compositing: Compositing::Over, source }).unwrap();
     }
@@ -207,7 +207,7 @@ fn a_shader_that_never_ends_is_an_error_and_the_action_goes_on() {
     let good = by_source(&lut(&volume, greys(&[(1.0, 1.0, 0.5)]), 1.0), "own");
     let setup = Setup::post(0.5);
     let mut action = setup.action_in(&all);
-    let error = told(&draw(&mut *action, &[endless.clone()], &along_y(0.7, 0.7)).unwrap_err());
+    let error = told(&draw(&mut *action, std::slice::from_ref(&endless), &along_y(0.7, 0.7)).unwrap_err());
     assert!(error.contains("endless") && error.contains("65536"), "{error}");
     action.unmanage(&endless).unwrap();
     let frame = draw(&mut *action, &[good], &along_y(0.7, 0.7)).unwrap();
