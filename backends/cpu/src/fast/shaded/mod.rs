@@ -1,7 +1,7 @@
 //! Shapes whose shader is a text: its program is evaluated over batches of samples.
 //!
 //! The samples of sixteen rays in one chunk of the lattice, at most 512, are one batch. Positions
-//! are made in f64 and are local from then on. The program asks its [`Surroundings`] for what
+//! are made in f64 and are local from then on. The program asks its `surroundings` for what
 //! volumes and tables say, sixteen positions at once; what it gives, colour and extinction, is
 //! taken over a whole segment by the exact exponential, and put together with the rest of the
 //! scene by the [`sweep`](super::sweep).
