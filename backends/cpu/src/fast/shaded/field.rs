@@ -173,20 +173,21 @@ pub unsafe fn gradients<S: Simd, F: Fetch>(field: &Field<'_>, p: Places<'_>, out
         let at = field.at(p, first);
         // SAFETY: the caller's promises.
         unsafe {
+            // Written out: what is called in a closure is not compiled for the unit.
             let [low, high] = field.roi;
-            let axis = |a: usize| {
-                S::min(S::max(S::load(&at[a]), S::splat(low[a])), S::splat(high[a]))
-            };
-            let at = [axis(0), axis(1), axis(2)];
+            let x = S::min(S::max(S::load(&at[0]), S::splat(low.x)), S::splat(high.x));
+            let y = S::min(S::max(S::load(&at[1]), S::splat(low.y)), S::splat(high.y));
+            let z = S::min(S::max(S::load(&at[2]), S::splat(low.z)), S::splat(high.z));
             // Along each axis of the data, over one voxel either way, up to the data's edge.
+            let (one, half) = (S::splat(1.0), S::splat(half));
             let mut along = [S::splat(0.0); 3];
-            for (a, along) in along.iter_mut().enumerate() {
-                let moved = |way: f32| {
-                    let mut moved = at;
-                    moved[a] = S::add(at[a], S::splat(way));
-                    F::fetch::<S>(&field.whole, &field.data, moved)
-                };
-                *along = S::mul(S::splat(half), S::sub(moved(1.0), moved(-1.0)));
+            for a in 0..3 {
+                let (mut after, mut before) = ([x, y, z], [x, y, z]);
+                after[a] = S::add(after[a], one);
+                before[a] = S::sub(before[a], one);
+                let after = F::fetch::<S>(&field.whole, &field.data, after);
+                let before = F::fetch::<S>(&field.whole, &field.data, before);
+                along[a] = S::mul(half, S::sub(after, before));
             }
             for (c, row) in out.iter_mut().enumerate() {
                 let Some(row) = row.get_mut(first..).and_then(<[f32]>::first_chunk_mut) else { continue };
@@ -199,7 +200,9 @@ pub unsafe fn gradients<S: Simd, F: Fetch>(field: &Field<'_>, p: Places<'_>, out
                     continue;
                 }
                 let mut by_axis = [[0f32; LANES]; 3];
-                (0..3).for_each(|a| S::store(along[a], &mut by_axis[a]));
+                for a in 0..3 {
+                    S::store(along[a], &mut by_axis[a]);
+                }
                 for l in 0..LANES {
                     let column = field.slope(p, first + l).col(c);
                     row[l] = column.x * by_axis[0][l] + column.y * by_axis[1][l] + column.z * by_axis[2][l];
