@@ -266,6 +266,7 @@ impl<'a> Evaluator<'a> {
 pub fn places(lines: &[[&Lanes; 2]; 3], rows: &[Row], shift: f64, out: [&mut [f32]; 3]) {
     let [x, y, z] = out;
     let out = x.as_chunks_mut::<LANES>().0.iter_mut().zip(y.as_chunks_mut::<LANES>().0).zip(z.as_chunks_mut::<LANES>().0);
+    let lines = lines.map(|[from, along]| [*from, *along]);
     for (row, ((x, y), z)) in rows.iter().zip(out) {
         let mut t = row.t;
         if shift != 0.0 {
@@ -273,10 +274,13 @@ pub fn places(lines: &[[&Lanes; 2]; 3], rows: &[Row], shift: f64, out: [&mut [f3
                 t[l] += shift * f64::from(row.length[l]);
             }
         }
-        for l in 0..LANES {
-            x[l] = (lines[0][0][l] + lines[0][1][l] * t[l]) as f32;
-            y[l] = (lines[1][0][l] + lines[1][1][l] * t[l]) as f32;
-            z[l] = (lines[2][0][l] + lines[2][1][l] * t[l]) as f32;
+        // In places of its own, so that the compiler makes vectors of it.
+        let mut at = [[0f32; LANES]; 3];
+        for a in 0..3 {
+            for l in 0..LANES {
+                at[a][l] = (lines[a][0][l] + lines[a][1][l] * t[l]) as f32;
+            }
         }
+        (*x, *y, *z) = (at[0], at[1], at[2]);
     }
 }

@@ -72,26 +72,40 @@ impl Lookup {
     }
 
     /// How many control points are not above sixteen values.
+    ///
+    /// # Safety
+    /// Called from a function compiled for `S` on a machine that has it.
     #[inline(always)]
-    fn places(&self, value: &[f32; LANES]) -> [usize; LANES] {
+    unsafe fn places<S: Simd>(&self, value: &[f32; LANES]) -> S::I {
         let points = &self.values[..self.values.len() - 1];
-        if points.len() <= FEW {
-            let mut places = [0u32; LANES];
-            for point in points {
+        // SAFETY: the caller's promise.
+        unsafe {
+            if points.len() > FEW {
+                let mut found = [0f32; LANES];
                 for l in 0..LANES {
-                    places[l] += u32::from(value[l] >= *point);
+                    found[l] = self.search(value[l]) as f32;
                 }
+                return S::to_int(S::load(&found));
             }
-            return places.map(|p| p as usize);
+            let (value, one, none) = (S::load(value), S::splat_int(1), S::splat_int(0));
+            let mut places = none;
+            for point in points {
+                let below = S::lt_bits(value, S::splat(*point));
+                places = S::add_int(places, S::select_int(below, none, one));
+            }
+            places
         }
-        value.map(|value| {
-            let bin = ((value - self.low) * self.scale) as usize;
-            let mut after = self.bins[bin.min(self.bins.len() - 1)] as usize;
-            while after < points.len() && points[after] <= value {
-                after += 1;
-            }
-            after
-        })
+    }
+
+    /// The same of one value, from its bin on.
+    fn search(&self, value: f32) -> usize {
+        let last = self.values.len() - 1;
+        let bin = ((value - self.low) * self.scale) as usize;
+        let mut after = self.bins[bin.min(self.bins.len() - 1)] as usize;
+        while after < last && self.values[after] <= value {
+            after += 1;
+        }
+        after
     }
 
     /// Straight colour and opacity of sixteen values; NaN for NaN.
@@ -100,20 +114,20 @@ impl Lookup {
     /// Called from a function compiled for `S` on a machine that has it.
     #[inline(always)]
     unsafe fn classify<S: Simd>(&self, value: &[f32; LANES]) -> [S::F; 4] {
-        let places = self.places(value);
-        let (mut first, mut second, mut anchor) = ([0i32; LANES], [0i32; LANES], [0f32; LANES]);
-        for l in 0..LANES {
-            let place = places[l].min(self.lines.len() - 1);
-            (first[l], second[l], anchor[l]) = (2 * place as i32, 2 * place as i32 + 1, self.anchors[place]);
-        }
-        // SAFETY: the caller's promise; each place has a line of two rows.
+        // SAFETY: the caller's promise; each place has a line of two rows, and an anchor.
         unsafe {
+            let places = self.places::<S>(value);
+            let (mut first, mut second) = ([0i32; LANES], [0i32; LANES]);
+            let twice = S::add_int(places, places);
+            S::store_int(twice, &mut first);
+            S::store_int(S::add_int(twice, S::splat_int(1)), &mut second);
             let table = self.lines.as_ptr().cast::<u8>();
             let (from, slope) = (S::rows(table, &first), S::rows(table, &second));
+            let anchor = S::as_float(S::gather(self.anchors.as_ptr().cast(), S::shl::<2>(places)));
             let value = S::load(value);
             // Infinite values stand beyond the last point, where nothing changes.
             let bounded = S::max(S::min(value, S::splat(f32::MAX)), S::splat(f32::MIN));
-            let off = S::sub(bounded, S::load(&anchor));
+            let off = S::sub(bounded, anchor);
             let unknown = S::nan_bits(value);
             let mut rgba = [off; 4];
             for c in 0..4 {
