@@ -63,6 +63,7 @@ mod scene;
 mod series;
 mod sight;
 mod slices;
+mod source;
 mod surfaces;
 mod tetra;
 
