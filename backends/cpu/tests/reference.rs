@@ -36,6 +36,8 @@ mod source_common;
 mod source_flat;
 #[path = "reference/source_over.rs"]
 mod source_over;
+#[path = "reference/source_refused.rs"]
+mod source_refused;
 #[path = "reference/source_scene.rs"]
 mod source_scene;
 #[path = "reference/speed.rs"]
