@@ -34,6 +34,8 @@ mod slices;
 mod source_common;
 #[path = "reference/source_flat.rs"]
 mod source_flat;
+#[path = "reference/source_mesh.rs"]
+mod source_mesh;
 #[path = "reference/source_over.rs"]
 mod source_over;
 #[path = "reference/source_refused.rs"]

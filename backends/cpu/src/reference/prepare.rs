@@ -122,15 +122,15 @@ pub(super) fn tessellate(shape: &ResolvedShape) -> Result<Tessellation, ActionEr
 }
 
 /// Refuses attributes that have not a number for each vertex.
-fn check_attributes(shape: &ResolvedShape, made: &Tessellation) -> Result<(), ActionError> {
+pub(super) fn check_attributes(shape: &ResolvedShape, made: &Tessellation) -> Result<(), ActionError> {
     let wanted = shape.state.geometry.vertex_count().unwrap_or(made.vertices.len());
-    for name in ["scalars", "opacity_scalars"] {
+    for name in shape.parameters.keys() {
         let Some(attribute) = shape.attribute(name).filter(|a| a.len() != wanted) else { continue };
         let kind = ProblemKind::Mistyped {
             found: format!("attribute {:?} of {} vertices", attribute.name, attribute.len()),
             wanted: format!("one of {wanted}, the geometry's"),
         };
-        let problems = vec![ParameterProblem { name: name.into(), kind }];
+        let problems = vec![ParameterProblem { name: name.clone(), kind }];
         let (shape, shader) = (shape.name.clone(), shape.state.shader.clone());
         return Err(ActionError::Parameters { shape, shader, problems });
     }

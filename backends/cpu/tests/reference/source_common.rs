@@ -85,13 +85,9 @@ pub fn alike(found: &[[f64; 4]], wanted: &[[f64; 4]], tolerance: f64) {
 #[track_caller]
 pub fn is(found: &ReferencePicture, truth: [f64; 4], tolerance: f64) {
     alike(&found.color[..1], &[truth], tolerance);
-    for c in 0..4 {
+    for (c, truth) in truth.into_iter().enumerate() {
         let (low, high) = (found.lower[0][c], found.upper[0][c]);
-        assert!(
-            low <= truth[c] + 1e-15 && truth[c] - 1e-15 <= high,
-            "channel {c}: {} not in {low} to {high}",
-            truth[c]
-        );
+        assert!(low <= truth + 1e-15 && truth - 1e-15 <= high, "channel {c}: {} not in {low} to {high}", truth);
         assert!(high - low <= 2.0 * tolerance, "channel {c} is {:e} wide", high - low);
     }
 }

@@ -3,10 +3,10 @@
 
 use proptest::prelude::*;
 use volact_core::{
-    Appearance, Camera, Compositing, FrameDesc, ParameterType, Shape, VolumeTexture,
+    Appearance, Camera, Compositing, FrameDesc, ParameterType, ScalarType, Shape, Volume, VolumeDesc, VolumeTexture,
     glam::{DAffine3, DVec3},
 };
-use volact_cpu::reference::Method;
+use volact_cpu::reference::{Method, ReferenceOptions};
 
 use super::{
     common::{along_z, lut, one_ray, point, table, volume_of},
@@ -150,8 +150,8 @@ proptest! {
             }
             // On a lattice there is no doubt but rounding.
             for method in [Method::Rays, Method::Planes] {
-                let options = volact_cpu::reference::ReferenceOptions { method, ..lattice(0.3) };
-                let native = volact_cpu::reference::ReferenceOptions { recognise: true, ..options };
+                let options = ReferenceOptions { method, ..lattice(0.3) };
+                let native = ReferenceOptions { recognise: true, ..options };
                 let [found, wanted] = [options, native].map(|o| draw(&all, std::slice::from_ref(&shape), &frame, &o));
                 alike(&found.color, &wanted.color, 1e-12);
             }
@@ -188,4 +188,72 @@ fn nearest_samples_are_cut_between_them() {
             [evaluated(), Default::default()].map(|o| draw(&all, std::slice::from_ref(&shape), &frame, &o));
         alike(&found.color, &wanted.color, 1e-9);
     }
+}
+
+/// Components by meaning are clamped, which bends them.
+#[test]
+fn simple_by_its_source_is_simple() {
+    let all = registry(&[]);
+    for components in 1..=4 {
+        let number = |i: usize| ((i * 7 + i / 3) as f64 * 0.9).sin();
+        let desc = VolumeDesc::new([3, 4, 4], ScalarType::F64, components);
+        let data = Volume::new(desc, (0..48 * components).map(number).collect::<Vec<_>>()).unwrap();
+        let texture = VolumeTexture::new(&data).with_range([-0.5, 0.7]).unwrap();
+        let shape = Shape::around_texture(&texture, Appearance::new("simple").with("unit_distance", 2.0));
+        for frame in views() {
+            let [found, wanted] =
+                [evaluated(), Default::default()].map(|o| draw(&all, std::slice::from_ref(&shape), &frame, &o));
+            alike(&found.color, &wanted.color, 2e-9);
+            assert!(wanted.color.iter().any(|c| c[3] > 0.1));
+        }
+    }
+}
+
+/// The lattice and the quadrature have nothing in common but the samples: one goes to the other by
+/// the square of the step.
+#[test]
+fn lattices_of_lit_sources_go_to_the_integral() {
+    let data = volume_of([6, 6, 6], |[x, y, z]| {
+        (0.5 * x as f64 + 0.3).sin() * (0.4 * y as f64).cos() + 0.4 * (0.6 * z as f64).sin()
+    });
+    let all = registry(&[]);
+    for name in ["gradient", "tangent_space"] {
+        let look = Appearance::new(name)
+            .with("lookup_table", table(&[point(-1.0, [0.1, 0.4, 0.9], 0.05), point(1.5, [0.9, 0.5, 0.1], 0.6)]))
+            .with("unit_distance", 1.0);
+        let shape = Shape::around(&data, look);
+        // Inside of where gradients end at the data's edge.
+        shape.set_geometry(volact_core::Block::new(DVec3::splat(1.0), DVec3::splat(3.0)).unwrap());
+        let frame =
+            FrameDesc::new(Camera::perspective(DVec3::new(9.0, -7.0, 10.0), DVec3::splat(2.5), DVec3::Z, 12.0), 5, 5);
+        let exact = draw(&all, std::slice::from_ref(&shape), &frame, &evaluated());
+        assert_eq!(exact.not_certified, 0);
+        let error = |step: f64| {
+            let made = draw(&all, std::slice::from_ref(&shape), &frame, &lattice(step));
+            let wrong = made.color.iter().flatten().zip(exact.color.iter().flatten()).map(|(a, b)| (a - b).powi(2));
+            wrong.sum::<f64>().sqrt()
+        };
+        let (coarse, fine) = (error(0.2), error(0.0125));
+        let order = (coarse / fine).log2() / 4.0;
+        assert!((1.8..2.3).contains(&order) && fine < 1e-3, "{name}: {order}, {fine:e}");
+        // A looser tolerance is honoured, too.
+        let loose =
+            draw(&all, std::slice::from_ref(&shape), &frame, &ReferenceOptions { tolerance: 1e-5, ..evaluated() });
+        alike(&loose.color, &exact.color, 1e-5);
+        assert!(loose.samples < exact.samples);
+    }
+}
+
+/// Bounded where nothing converges: an estimate that says so, and no end that never comes.
+#[test]
+fn noise_ends_with_a_wide_estimate() {
+    let text = "fn shade(s: Sample) -> Medium {
+        let k = bitcast<u32>(s.position.z) * 2654435769u;
+        return Medium(vec3(1.0), density() * f32(k >> 8u) / 16777216.0);
+    }";
+    let all = registry(&[shader("noise", Compositing::Over, &[("density", TO)], text)]);
+    let made = draw(&all, &[in_cube(Appearance::new("noise").with("density", 4.0))], &along_z(0.3, 0.4), &evaluated());
+    let alpha = -(-2.0f64).exp_m1();
+    assert!((made.color[0][3] - alpha).abs() < 0.02, "{:?}", made.color[0]);
+    assert!(made.not_certified == 1 && made.samples < 1_000_000, "{} {}", made.widest, made.samples);
 }

@@ -3,8 +3,7 @@
 
 use volact_core::{
     Appearance, Block, Compositing, Context, FrameDesc, LookupTable, Options, ParameterType, ParameterValue, Plane,
-    RenderAction, Shape, ShaderEntry, SliceStyle, Sliced, Slices, View, WarningCode,
-    glam::DVec3,
+    RenderAction, ShaderEntry, Shape, SliceStyle, Sliced, Slices, View, WarningCode, glam::DVec3,
 };
 use volact_cpu::reference::{ReferenceAction, ReferenceOptions, declaration};
 
@@ -67,7 +66,8 @@ fn a_program_that_does_what_lut_does_is_certified_as_lut() {
 
 #[test]
 fn a_frame_says_what_is_an_estimate() {
-    let all = registry(&[like_lut("own", "fn shade(s: Sample) -> Medium { return lookup_table(volume(s.position)); }")]);
+    let all =
+        registry(&[like_lut("own", "fn shade(s: Sample) -> Medium { return lookup_table(volume(s.position)); }")]);
     let shape = by(&lut(&data(), warm(), 0.8), "own");
     let frame = FrameDesc::fit(&shape, View::Iso, 6, 6);
     let draw = |given: &[(&str, ParameterValue)]| {
@@ -82,7 +82,8 @@ fn a_frame_says_what_is_an_estimate() {
         action.end_draw().unwrap()
     };
     let told = |frame: &volact_core::Frame| {
-        let warned = frame.warnings.iter().any(|w| w.code == WarningCode::NotCertified && w.to_string().contains("own"));
+        let warned =
+            frame.warnings.iter().any(|w| w.code == WarningCode::NotCertified && w.to_string().contains("own"));
         let detail = frame.statistics.details.iter().any(|(n, v)| n == "estimated, not certified" && v == "own");
         assert_eq!(warned, detail);
         assert_eq!(warned, frame.method.sampling.contains("adaptive quadrature"));
@@ -169,7 +170,8 @@ fn blend2_is_two_shapes_in_one_place() {
     let both = Shape::around(&data(), look);
     let frame = FrameDesc::fit(&both, View::Iso, 6, 6);
     let all = registry(&[]);
-    let wanted = draw(&all, &[lut(&data(), warm(), 0.8), lut(&second, table2, 0.8)], &frame, &ReferenceOptions::default());
+    let wanted =
+        draw(&all, &[lut(&data(), warm(), 0.8), lut(&second, table2, 0.8)], &frame, &ReferenceOptions::default());
     assert_eq!(wanted.not_certified, 0);
     alike(&draw(&all, &[both], &frame, &ReferenceOptions::default()).color, &wanted.color, 3e-9);
 }

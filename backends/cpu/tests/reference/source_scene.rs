@@ -115,7 +115,7 @@ fn meshes_and_slices_are_those_of_tables() {
         for in_block in [false, true] {
             let shape = lut(&data(), table(&points()), 0.7);
             if in_block {
-                shape.set_geometry(block.clone())
+                shape.set_geometry(block)
             } else {
                 shape.set_geometry(mesh.clone())
             }

@@ -4,8 +4,9 @@
 //! that reaches them: what lies behind something dense need not be known.
 
 use super::{
+    ask::Asker,
     fit::{ALL, Span, places},
-    program::{Asker, Course, Medium, Sample},
+    program::{Course, Medium, Sample},
 };
 use crate::reference::line::EPS;
 
@@ -13,8 +14,11 @@ use crate::reference::line::EPS;
 const LEAST: u8 = 1;
 /// And at most this often.
 const MOST: u8 = 60;
-/// The most spans of a stretch; then all are taken as they are, with their errors.
-const SPANS: usize = 1 << 17;
+/// The most spans of a stretch beyond some for each cut; then all are taken as they are, with their
+/// errors.
+const SPANS: usize = 1 << 14;
+/// The spans for each cut.
+const EACH: usize = 16;
 /// The light below which nothing is looked at.
 const DARK: f64 = 1e-14;
 /// The relative error of transmittance from which on it is no longer small.
@@ -22,14 +26,14 @@ const ROUGH: f64 = 1e-3;
 
 /// The spans of a stretch that is cut at `cuts`, until their errors are below `tolerance` each.
 /// `seen` is the light that comes so far.
-pub(super) fn spans(asker: &mut Asker<'_>, course: &Course, cuts: &[f64], tolerance: f64, seen: f64) -> Vec<Span> {
+pub(super) fn spans(asker: &mut Asker<'_>, course: &Course<'_>, cuts: &[f64], tolerance: f64, seen: f64) -> Vec<Span> {
     let whole: Vec<_> = cuts.windows(2).map(|w| ([w[0], w[1]], 0)).collect();
     let mut spans = evaluate(asker, course, &whole);
     let scale = cuts.iter().fold(course.at.abs().max_element(), |m, t| m.max(t.abs()));
     while spans.iter().any(|s| !s.done) {
         let halves: Vec<_> = spans.iter().filter(|s| !s.done).flat_map(halves).collect();
         let mut made = evaluate(asker, course, &halves).into_iter();
-        let crowded = spans.len() + halves.len() > SPANS;
+        let crowded = spans.len() + halves.len() > SPANS + EACH * cuts.len();
         let mut next = Vec::with_capacity(spans.len() + halves.len());
         let mut left = seen;
         for span in spans {
@@ -72,7 +76,7 @@ fn halves(span: &Span) -> [([f64; 2], u8); 2] {
     [([start, middle], span.level + 1), ([middle, end], span.level + 1)]
 }
 
-fn evaluate(asker: &mut Asker<'_>, course: &Course, parts: &[([f64; 2], u8)]) -> Vec<Span> {
+fn evaluate(asker: &mut Asker<'_>, course: &Course<'_>, parts: &[([f64; 2], u8)]) -> Vec<Span> {
     let at = |t: f64| Sample { t, ..Sample::default() };
     let samples: Vec<Sample> = parts.iter().flat_map(|(t, _)| places(*t)).map(at).collect();
     let media = asker.media(course, &samples);

@@ -21,6 +21,8 @@ pub(in crate::reference) struct Grids(Vec<Grid>);
 struct Grid {
     /// From local space.
     to_index: DAffine3,
+    /// From texture coordinates.
+    unbent: DAffine3,
     /// The last sample along each axis.
     last: [usize; 3],
     /// 0 for planes through samples, ½ for planes between them.
@@ -45,9 +47,17 @@ impl Grids {
     }
 
     /// The places between two ends, in order and with the ends, at which to cut.
-    pub fn cuts(&self, course: &Course, [start, end]: [f64; 2]) -> Vec<f64> {
+    pub fn cuts(&self, course: &Course<'_>, [start, end]: [f64; 2]) -> Vec<f64> {
         let mut cuts = vec![start, end];
-        self.0.iter().for_each(|grid| grid.cut(course, [start, end], &mut cuts));
+        if course.cells.is_empty() {
+            self.0.iter().for_each(|grid| grid.cut(course, grid.to_index, [start, end], &mut cuts));
+        }
+        for cell in course.cells {
+            let t = [cell.t[0].max(start), cell.t[1].min(end)];
+            cuts.extend(t.into_iter().filter(|t| *t > start && *t < end));
+            let map = |grid: &Grid| cell.bent.map_or(grid.to_index, |bent| grid.unbent * bent);
+            self.0.iter().for_each(|grid| grid.cut(course, map(grid), t, &mut cuts));
+        }
         cuts.sort_by(f64::total_cmp);
         // What is nearer than rounding is one.
         let near = 64.0 * EPS * (start.abs().max(end.abs()) + course.at.abs().max_element());
@@ -75,14 +85,15 @@ impl Grid {
         let roi = texture.geometry_roi();
         Self {
             to_index: object_to_index * to_object,
+            unbent: object_to_index * DAffine3::from_translation(roi.min) * DAffine3::from_scale(roi.max - roi.min),
             last: texture.volume().dims().map(|n| n - 1),
             shift: if nearest { 0.5 } else { 0.0 },
             ends: [roi.min, roi.max].map(|p| object_to_index.transform_point3(p)),
         }
     }
 
-    fn cut(&self, course: &Course, [start, end]: [f64; 2], cuts: &mut Vec<f64>) {
-        let (at, step) = (self.to_index.transform_point3(course.at), self.to_index.transform_vector3(course.direction));
+    fn cut(&self, course: &Course<'_>, map: DAffine3, [start, end]: [f64; 2], cuts: &mut Vec<f64>) {
+        let (at, step) = (map.transform_point3(course.at), map.transform_vector3(course.direction));
         for a in 0..3 {
             if step[a] == 0.0 {
                 continue;

@@ -18,6 +18,9 @@
 //! colour.
 
 mod adapt;
+mod ask;
+mod bent;
+mod carried;
 mod cuts;
 mod fit;
 mod met;
@@ -33,9 +36,9 @@ use volact_shaders::{Native, Program, builtin, recognise};
 
 use super::{options::NAME, surfaces};
 
+pub(super) use ask::Asker;
 pub(super) use met::Met;
 pub(super) use prepare::{Prepared, prepare};
-pub(super) use program::Asker;
 pub(super) use refused::check;
 
 /// How a shape is drawn.

@@ -1,15 +1,11 @@
 //! Emission and absorption: a shape's pieces along a ray, to be marched through alone or with
 //! those of others.
 
-use super::{
-    adapt,
-    fit::Span,
-    met::{Met, Stretch},
-    program::Asker,
-};
+use volact_core::lattice::Segment;
+
+use super::{adapt, ask::Asker, carried::Lane, fit::Span, met::Met, program::Course};
 use crate::reference::{
     cubic,
-    lattice::Counting,
     line::EPS,
     met::{Sampling, number_of},
     overlap::{Along, Track},
@@ -31,18 +27,37 @@ impl Met<'_> {
         asker: &mut Asker<'_>,
         range: &mut [f64; 2],
     ) {
-        let shift = self.anchor - zero;
+        for lane in &self.lanes {
+            self.add_lane(lane, along, zero, sampling, tolerance, asker, range);
+        }
+    }
+
+    #[expect(clippy::too_many_arguments, reason = "those of the one who calls it, and the lane")]
+    fn add_lane(
+        &self,
+        lane: &Lane,
+        along: &mut Along,
+        zero: f64,
+        sampling: &Sampling,
+        tolerance: f64,
+        asker: &mut Asker<'_>,
+        range: &mut [f64; 2],
+    ) {
+        let (shift, course) = (self.anchor - zero, &self.course(lane));
         let around = 8.0 * EPS * (self.anchor.abs() + zero.abs() + shift.abs());
         let (mut track, mut left) = (Track::new(), 1.0);
-        for stretch in &self.stretches {
+        for stretch in &lane.stretches {
             if left <= (-DEEP).exp() {
                 break;
             }
             along.snap = along.snap.max(2.0 * stretch.dt + around);
             let pieces = match &sampling.counting {
-                Some(counting) => self.segments(stretch, counting, sampling.between_ends, asker, &mut left),
+                Some(counting) => {
+                    let segments = counting.segments_of(self.anchor, stretch.t);
+                    self.segments(course, segments, sampling.between_ends, asker, &mut left)
+                }
                 None => {
-                    let spans = adapt::spans(asker, &self.course, &self.cuts(stretch), Self::share(tolerance), left);
+                    let spans = adapt::spans(asker, course, &self.cuts(lane, stretch), Self::share(tolerance), left);
                     left *= spans.iter().map(|s| (-s.depth.max(0.0)).exp()).product::<f64>();
                     tidy(&spans, 2.0 * along.snap)
                 }
@@ -60,16 +75,16 @@ impl Met<'_> {
     /// The segments of a lattice, each of one medium.
     fn segments(
         &self,
-        stretch: &Stretch,
-        counting: &Counting,
+        course: &Course<'_>,
+        segments: impl Iterator<Item = Segment>,
         by_ends: bool,
         asker: &mut Asker<'_>,
         left: &mut f64,
     ) -> Vec<Piece> {
-        let ends: Vec<_> = counting.segments_of(self.anchor, stretch.t).map(|s| [s.start, s.end]).collect();
+        let ends: Vec<_> = segments.map(|s| [s.start, s.end]).collect();
         let mut pieces = Vec::new();
         for some in ends.chunks(volact_shaders::eval::BATCH) {
-            let media = if by_ends { asker.segments(&self.course, some) } else { asker.middles(&self.course, some) };
+            let media = if by_ends { asker.segments(course, some) } else { asker.middles(course, some) };
             for (t, [r, g, b, extinction]) in some.iter().zip(media).filter(|(t, _)| t[1] > t[0]) {
                 // Over a length of this optical depth opacity is ½ to the bit.
                 pieces.push(match extinction {

@@ -7,8 +7,11 @@ use volact_core::{
 };
 use volact_shaders::Program;
 
-use super::program::Source;
-use crate::reference::{mesh::Mesh, prepare::tessellate};
+use super::{carried::Carried, program::Source, refused::has_attributes};
+use crate::reference::{
+    mesh::Mesh,
+    prepare::{check_attributes, tessellate},
+};
 
 /// A shape made ready.
 pub(in crate::reference) struct Prepared {
@@ -19,6 +22,8 @@ pub(in crate::reference) struct Prepared {
     pub source: Source,
     /// The tetrahedra that it fills, where it is no block.
     pub mesh: Option<Mesh>,
+    /// What they tell the program, if that is anything.
+    pub carried: Option<Carried>,
     /// The box that holds it, in object space.
     pub block: Option<Aabb>,
     pub to_object: DAffine3,
@@ -46,16 +51,20 @@ pub(in crate::reference) fn prepare(
     program: Program,
     order: usize,
 ) -> Result<Option<Prepared>, ActionError> {
-    let mut mesh = None;
+    let source = Source::new(shape, program.clone())?;
+    let (mut mesh, mut carried) = (None, None);
     // The geometry and the region of the first volume say where it is.
     let mut block = shape.block();
-    if shape.state.geometry.as_block().is_none() {
+    if has_attributes(shape) || shape.state.geometry.as_block().is_none() {
         let made = tessellate(shape)?;
+        check_attributes(shape, &made)?;
         if made.tetrahedra.is_empty() {
             return Ok(None);
         }
         mesh = Some(Mesh::new(&made));
-        block = shape.first_volume().map(|texture| texture.geometry_roi());
+        carried = Carried::new(shape, &program, &source, &made);
+        let placed = made.texture_coordinates.is_none();
+        block = shape.first_volume().filter(|_| placed).map(|texture| texture.geometry_roi());
     }
     if block.is_some_and(|block| block.is_empty()) {
         return Ok(None);
@@ -64,8 +73,9 @@ pub(in crate::reference) fn prepare(
     Ok(Some(Prepared {
         id: shape.id,
         order,
-        source: Source::new(shape, program)?,
+        source,
         mesh,
+        carried,
         block,
         to_object: shape.to_object,
         center: bounds.center(),

@@ -9,13 +9,15 @@ use volact_core::{
     resolve::ResolvedShape,
 };
 use volact_shaders::{
-    Entry, Kernel, Machine, Program,
-    eval::{BATCH, Field, Function, Input, Overrun, Uniforms},
-    plain::Plain,
+    Entry, Kernel, Program,
+    eval::{Field, Function, Overrun, Uniforms},
 };
 
-use super::{cuts::Grids, wrong};
-use crate::reference::{dd::Dd, line::map_point};
+use super::{carried::Cell, cuts::Grids, wrong};
+use crate::reference::{
+    dd::Dd,
+    line::{EPS, map_point},
+};
 
 /// Straight colour and extinction.
 pub(in crate::reference) type Medium = [f64; 4];
@@ -23,13 +25,15 @@ pub(in crate::reference) type Medium = [f64; 4];
 /// A shape's program with the parameters that are the same for every sample.
 pub(in crate::reference) struct Source {
     shape: String,
-    program: Program,
-    shade: Kernel<f64>,
-    value: Option<Kernel<f64>>,
-    segment: Option<Kernel<f64>>,
-    parameters: ParameterMap,
-    /// Local to object space, as [`Plain`] takes it: the other way round.
-    local: DAffine3,
+    pub(super) program: Program,
+    pub(super) shade: Kernel<f64>,
+    pub(super) value: Option<Kernel<f64>>,
+    pub(super) segment: Option<Kernel<f64>>,
+    pub(super) parameters: ParameterMap,
+    /// From object to local space.
+    pub(super) local: DAffine3,
+    /// For each parameter that is a volume, from texture coordinates to local space.
+    pub(super) unbent: Vec<Option<DAffine3>>,
     /// The point of the world that is the origin of local space.
     pub origin: DVec3,
     pub compositing: Compositing,
@@ -39,7 +43,7 @@ pub(in crate::reference) struct Source {
     pub crossed: Vec<f64>,
     /// Where the volumes that it reads change their cells.
     pub grids: Grids,
-    failed: OnceLock<Overrun>,
+    pub(super) failed: OnceLock<Overrun>,
 }
 
 /// A sample on a course: its place, the length that it stands for, and what a compositing made.
@@ -53,17 +57,28 @@ pub(in crate::reference) struct Sample {
 
 /// A ray in a shape's local space.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::reference) struct Course {
+pub(in crate::reference) struct Course<'c> {
     /// Where it is at the anchor.
     pub at: DVec3,
     /// Of length 1.
     pub direction: DVec3,
     /// The anchor's distance from where depth is counted.
     pub depth: f64,
+    /// The tetrahedra that it goes through, in order; none where nothing depends on them.
+    pub cells: &'c [Cell],
 }
 
-impl Course {
-    fn number(&self, field: Field, s: &Sample) -> f64 {
+impl<'c> Course<'c> {
+    /// The tetrahedron that holds a place, give or take rounding.
+    pub fn cell(&self, t: f64) -> Option<&'c Cell> {
+        let loose = 64.0 * EPS * (self.depth.abs() + self.at.abs().max_element() + t.abs());
+        let after = self.cells.partition_point(|c| c.t[1] < t);
+        let held = |c: &&Cell| c.t[0] - loose <= t && t <= c.t[1] + loose;
+        let before = after.checked_sub(1).and_then(|i| self.cells.get(i));
+        self.cells.get(after).filter(held).or(before.filter(held))
+    }
+
+    pub fn number(&self, field: Field, s: &Sample) -> f64 {
         let axis = |a: u8| usize::from(a.min(2));
         match field {
             Field::Position(a) => self.at[axis(a)] + self.direction[axis(a)] * s.t,
@@ -72,8 +87,9 @@ impl Course {
             Field::Step => s.step,
             Field::Depth => self.depth + s.t,
             Field::Value => s.value,
-            // Shapes with attributes are refused.
-            Field::Attribute(_) | Field::AttributeComponent(..) => f64::NAN,
+            Field::Attribute(_) | Field::AttributeComponent(..) => {
+                self.cell(s.t).map_or(f64::NAN, |cell| cell.number(field, s.t))
+            }
         }
     }
 }
@@ -101,6 +117,7 @@ impl Source {
             compositing: program.compositing(),
             unit: program.declaration().parameter("unit_distance").and_then(|_| shape.float("unit_distance")),
             parameters: shape.parameters.clone(),
+            unbent: unbent(shape, &program, to_object.inverse()),
             local: to_object.inverse(),
             origin,
             program,
@@ -109,6 +126,11 @@ impl Source {
             segment,
             failed: OnceLock::new(),
         })
+    }
+
+    /// A place of object space in local space.
+    pub fn to_local(&self, p: DVec3) -> DVec3 {
+        self.local.transform_point3(p)
     }
 
     /// The shape's name.
@@ -126,6 +148,15 @@ impl Source {
     }
 }
 
+/// From texture coordinates, 0 to 1 over its region, to where a volume lies in local space.
+fn unbent(shape: &ResolvedShape, program: &Program, local: DAffine3) -> Vec<Option<DAffine3>> {
+    let volume = |name: &str| {
+        let roi = shape.volume(name)?.geometry_roi();
+        Some(local * DAffine3::from_translation(roi.min) * DAffine3::from_scale(roi.max - roi.min))
+    };
+    program.declaration().parameters.iter().map(|p| volume(&p.name)).collect()
+}
+
 /// The values of the control points of the first table declared, in rising order.
 fn crossed(shape: &ResolvedShape, program: &Program) -> Vec<f64> {
     let declared = &program.declaration().parameters;
@@ -140,137 +171,4 @@ fn crossed(shape: &ResolvedShape, program: &Program) -> Vec<f64> {
     values.sort_by(f64::total_cmp);
     values.dedup();
     values
-}
-
-/// A thread's means to ask a program.
-pub(in crate::reference) struct Asker<'s> {
-    source: &'s Source,
-    shade: Runner<'s>,
-    value: Option<Runner<'s>>,
-    segment: Option<Runner<'s>>,
-    /// Samples evaluated.
-    pub samples: u64,
-}
-
-/// One function of a program.
-struct Runner<'s> {
-    inputs: Vec<Input>,
-    machine: Machine<'s, f64>,
-    plain: Plain,
-    rows: Vec<Vec<f64>>,
-}
-
-impl<'s> Runner<'s> {
-    fn new(source: &'s Source, kernel: &'s Kernel<f64>) -> Self {
-        let uniforms = Uniforms { parameters: &source.parameters, object_to_world: source.local, origin: DVec3::ZERO };
-        let inputs: Vec<Input> = kernel.inputs().collect();
-        Self {
-            rows: vec![Vec::with_capacity(BATCH); inputs.len()],
-            inputs,
-            machine: Machine::new(kernel),
-            plain: Plain::new(&source.program, kernel, &uniforms),
-        }
-    }
-
-    /// Evaluates `count` samples, of which `number` gives the numbers; `take` is told each
-    /// sample's index and, by output, its numbers.
-    fn run<const N: usize>(
-        &mut self,
-        count: usize,
-        number: impl Fn(usize, Input) -> f64,
-        mut take: impl FnMut([f64; N]),
-    ) -> Result<(), Overrun> {
-        for first in (0..count).step_by(BATCH) {
-            let batch = first..(first + BATCH).min(count);
-            for (input, row) in self.inputs.iter().zip(&mut self.rows) {
-                row.clear();
-                row.extend(batch.clone().map(|i| number(i, *input)));
-            }
-            let rows: Vec<&[f64]> = self.rows.iter().map(Vec::as_slice).collect();
-            self.machine.run(batch.len(), &rows, &mut self.plain)?;
-            (0..batch.len()).for_each(|i| take(std::array::from_fn(|k| self.machine.output(k)[i])));
-        }
-        Ok(())
-    }
-}
-
-impl<'s> Asker<'s> {
-    /// Means to ask a program.
-    pub fn new(source: &'s Source) -> Self {
-        let runner = |kernel| Runner::new(source, kernel);
-        Self {
-            source,
-            shade: runner(&source.shade),
-            value: source.value.as_ref().map(runner),
-            segment: source.segment.as_ref().map(runner),
-            samples: 0,
-        }
-    }
-
-    /// The media at samples; nothing once the program has failed.
-    pub fn media(&mut self, course: &Course, samples: &[Sample]) -> Vec<Medium> {
-        let mut media = Vec::with_capacity(samples.len());
-        self.samples += samples.len() as u64;
-        let number = |i: usize, input: Input| course.number(input.field, &samples[i]);
-        if self.goes_on() {
-            let done = self.shade.run(samples.len(), number, |m: Medium| media.push(clean(m)));
-            self.note(done);
-        }
-        media.resize(samples.len(), [0.0; 4]);
-        media
-    }
-
-    /// The media of segments by their ends; by their middles where the program has no word on it.
-    pub fn segments(&mut self, course: &Course, ends: &[[f64; 2]]) -> Vec<Medium> {
-        let goes_on = self.goes_on();
-        let Some(runner) = self.segment.as_mut().filter(|_| goes_on) else { return self.middles(course, ends) };
-        let sample = |t: f64, [a, b]: [f64; 2]| Sample { t, step: b - a, value: 0.0 };
-        let mut media = Vec::with_capacity(ends.len());
-        let number = |i: usize, input: Input| {
-            let at = ends[i][usize::from(input.sample == 1)];
-            course.number(input.field, &sample(at, ends[i]))
-        };
-        let done = runner.run(ends.len(), number, |m: Medium| media.push(clean(m)));
-        self.samples += 2 * ends.len() as u64;
-        self.note(done);
-        media.resize(ends.len(), [0.0; 4]);
-        media
-    }
-
-    /// The media in the middles of segments.
-    pub fn middles(&mut self, course: &Course, ends: &[[f64; 2]]) -> Vec<Medium> {
-        let middle = |[a, b]: &[f64; 2]| Sample { t: 0.5 * (a + b), step: b - a, value: 0.0 };
-        self.media(course, &ends.iter().map(middle).collect::<Vec<_>>())
-    }
-
-    /// What the compositing takes at samples; NaN where there is nothing.
-    pub fn values(&mut self, course: &Course, samples: &[Sample]) -> Vec<f64> {
-        let mut values = Vec::with_capacity(samples.len());
-        self.samples += samples.len() as u64;
-        let number = |i: usize, input: Input| course.number(input.field, &samples[i]);
-        let goes_on = self.goes_on();
-        if let Some(runner) = self.value.as_mut().filter(|_| goes_on) {
-            let done = runner.run(samples.len(), number, |[v]: [f64; 1]| values.push(v));
-            self.note(done);
-        }
-        values.resize(samples.len(), f64::NAN);
-        values
-    }
-
-    fn goes_on(&self) -> bool {
-        self.source.failed.get().is_none()
-    }
-
-    /// The first failure is told; which one that is does not matter.
-    fn note(&self, done: Result<(), Overrun>) {
-        if let Err(overrun) = done {
-            let _ = self.source.failed.set(overrun);
-        }
-    }
-}
-
-/// A medium that is one: transparent where anything is no number.
-fn clean([r, g, b, extinction]: Medium) -> Medium {
-    let usable = r.is_finite() && g.is_finite() && b.is_finite() && extinction > 0.0;
-    if usable { [r, g, b, extinction] } else { [0.0; 4] }
 }

@@ -7,8 +7,9 @@
 use volact_core::Compositing;
 
 use super::{
+    ask::Asker,
     fit::{ALL, WEIGHTS, miss, places, through},
-    program::{Asker, Course, Sample},
+    program::{Course, Sample},
     search,
 };
 use crate::reference::{line::EPS, march::Light};
@@ -17,8 +18,10 @@ use crate::reference::{line::EPS, march::Light};
 const LEAST: u8 = 1;
 /// And at most this often.
 const MOST: u8 = 56;
-/// The most parts of a stretch.
-const PARTS: usize = 1 << 17;
+/// The most parts of a stretch, beyond some for each cut.
+const PARTS: usize = 1 << 15;
+/// The parts for each cut.
+const EACH: usize = 64;
 
 /// What was gathered of a value along a ray.
 #[derive(Clone, Copy, Debug)]
@@ -48,7 +51,7 @@ impl Gathered {
     pub fn add_stretch(
         &mut self,
         asker: &mut Asker<'_>,
-        course: &Course,
+        course: &Course<'_>,
         cuts: &[f64],
         compositing: Compositing,
         tolerance: f64,
@@ -83,7 +86,7 @@ impl Gathered {
 }
 
 /// What a value shows: its medium and those at the ends of its error.
-pub(super) fn light(asker: &mut Asker<'_>, course: &Course, sample: Sample, error: f64) -> Light {
+pub(super) fn light(asker: &mut Asker<'_>, course: &Course<'_>, sample: Sample, error: f64) -> Light {
     let at = |value: f64| Sample { value, ..sample };
     let media = asker.media(course, &[at(sample.value), at(sample.value - error), at(sample.value + error)]);
     let mut light = Light { lower: [f64::INFINITY; 4], upper: [f64::NEG_INFINITY; 4], ..Light::NONE };
@@ -111,7 +114,7 @@ struct Part {
 }
 
 /// Integral, length and the error of the integral.
-fn integrate(asker: &mut Asker<'_>, course: &Course, cuts: &[f64], tolerance: f64) -> [f64; 3] {
+fn integrate(asker: &mut Asker<'_>, course: &Course<'_>, cuts: &[f64], tolerance: f64) -> [f64; 3] {
     let whole: Vec<_> = cuts.windows(2).map(|w| ([w[0], w[1]], 0)).collect();
     let (mut parts, mut most) = (Vec::new(), 0.0);
     evaluate(asker, course, &whole, &mut parts, &mut most);
@@ -131,7 +134,8 @@ fn integrate(asker: &mut Asker<'_>, course: &Course, cuts: &[f64], tolerance: f6
             let miss = two[0].miss.max(two[1].miss);
             let smooth = miss <= 0.25 * part.miss || miss <= wanted;
             let enough = part.level >= LEAST && smooth && wrong <= wanted;
-            let last = part.level >= MOST || count > PARTS || part.t[1] - part.t[0] <= 128.0 * EPS * scale;
+            let last =
+                part.level >= MOST || count > PARTS + EACH * cuts.len() || part.t[1] - part.t[0] <= 128.0 * EPS * scale;
             if enough || last {
                 total = [total[0] + sums[0], total[1] + sums[1], total[2] + wrong];
             } else {
@@ -148,7 +152,13 @@ fn halves(part: &Part) -> [([f64; 2], u8); 2] {
     [([part.t[0], middle], part.level + 1), ([middle, part.t[1]], part.level + 1)]
 }
 
-fn evaluate(asker: &mut Asker<'_>, course: &Course, parts: &[([f64; 2], u8)], made: &mut Vec<Part>, most: &mut f64) {
+fn evaluate(
+    asker: &mut Asker<'_>,
+    course: &Course<'_>,
+    parts: &[([f64; 2], u8)],
+    made: &mut Vec<Part>,
+    most: &mut f64,
+) {
     let samples: Vec<Sample> =
         parts.iter().flat_map(|(t, _)| places(*t)).map(|t| Sample { t, ..Sample::default() }).collect();
     let values = asker.values(course, &samples);

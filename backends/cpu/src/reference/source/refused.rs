@@ -5,19 +5,31 @@ use volact_core::{
 };
 use volact_shaders::Program;
 
-use crate::reference::options::NAME;
+use crate::reference::{
+    options::NAME,
+    prepare::{check_attributes, tessellate},
+};
 
 /// Refuses what cannot be drawn.
 ///
 /// # Errors
-/// [`ActionError::Unsupported`], by name and with a cure.
+/// [`ActionError::Unsupported`], by name and with a cure, or if an attribute does not go with the
+/// vertices.
 pub(in crate::reference) fn check(shape: &ResolvedShape, program: &Program) -> Result<(), ActionError> {
     match refused(shape, program) {
         Some((what, cure)) => {
             Err(ActionError::Unsupported { action: NAME.into(), shape: shape.name.clone(), what, cure: cure.into() })
         }
+        None if shape.state.geometry.vertex_count().is_none() && has_attributes(shape) => {
+            check_attributes(shape, &tessellate(shape)?)
+        }
         None => Ok(()),
     }
+}
+
+/// Whether a shape has numbers at vertices.
+pub(super) fn has_attributes(shape: &ResolvedShape) -> bool {
+    shape.parameters.values().any(|v| v.kind() == ParameterType::Attribute)
 }
 
 fn refused(shape: &ResolvedShape, program: &Program) -> Option<(String, &'static str)> {
@@ -45,14 +57,12 @@ fn refused(shape: &ResolvedShape, program: &Program) -> Option<(String, &'static
             return Some((what, "declare unit_distance: a plane is as opaque as that length of its medium"));
         }
     }
-    if shape.parameters.values().any(|v| v.kind() == ParameterType::Attribute) {
-        let what = format!("attributes of vertices in the evaluated shader {name:?}");
-        return Some((what, "draw them with the shader attribute and the option recognise"));
-    }
-    let bent =
-        geometry.as_block().is_none() && geometry.tessellate().is_ok_and(|mesh| mesh.texture_coordinates.is_some());
-    bent.then(|| {
-        let what = format!("texture coordinates of a mesh with the evaluated shader {name:?}");
-        (what, "leave them out, or use the shader lut and the option recognise")
+    let component = shape.int("component").filter(|_| program.declaration().parameter("component").is_some());
+    let few = |v: &ParameterValue| match (v, component) {
+        (ParameterValue::Attribute(a), Some(wanted)) if wanted >= a.components as i64 => Some((wanted, a.components)),
+        _ => None,
+    };
+    shape.parameters.values().find_map(few).map(|(wanted, count)| {
+        (format!("component {wanted} of an attribute that has {count}"), "name a component that is there")
     })
 }

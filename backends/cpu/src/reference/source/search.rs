@@ -5,15 +5,20 @@
 //! second differences: a parabola leaves them by an eighth of that at most, and eight times as
 //! much is allowed for.
 
-use super::program::{Asker, Course, Sample};
+use super::{
+    ask::Asker,
+    program::{Course, Sample},
+};
 use crate::reference::line::EPS;
 
 /// Parts are halved at least this often.
 const LEAST: u8 = 1;
 /// And at most this often.
 const MOST: u8 = 56;
-/// The most parts that are looked at.
-const PARTS: usize = 1 << 17;
+/// The most parts that are looked at, beyond some for each cut.
+const PARTS: usize = 1 << 15;
+/// The parts for each cut.
+const EACH: usize = 64;
 /// Up to this level one crossing is looked at more closely unless the value is plainly monotone.
 const PLAIN: u8 = 4;
 /// How far around a crossing the slope is looked at.
@@ -73,7 +78,7 @@ pub(super) fn crosses(a: f64, b: f64, value: f64) -> bool {
     !a.is_nan() && !b.is_nan() && (a >= value) != (b >= value)
 }
 
-fn evaluate(asker: &mut Asker<'_>, course: &Course, parts: &[([f64; 2], u8)]) -> Vec<Part> {
+fn evaluate(asker: &mut Asker<'_>, course: &Course<'_>, parts: &[([f64; 2], u8)]) -> Vec<Part> {
     let places = |t: &[f64; 2]| {
         let (width, most) = (t[1] - t[0], t[0].abs().max(t[1].abs()));
         let inside = (1e-12 * width).max(4.0 * EPS * most).min(0.125 * width);
@@ -96,7 +101,7 @@ fn evaluate(asker: &mut Asker<'_>, course: &Course, parts: &[([f64; 2], u8)]) ->
 /// have been.
 fn refine(
     asker: &mut Asker<'_>,
-    course: &Course,
+    course: &Course<'_>,
     cuts: &[f64],
     mut begin: impl FnMut(&[Part]),
     mut wanted: impl FnMut(&Part) -> bool,
@@ -110,7 +115,8 @@ fn refine(
         begin(&parts);
         for part in &parts {
             let again = part.level < LEAST || wanted(part);
-            let last = part.level >= MOST || count > PARTS || part.t[1] - part.t[0] <= 64.0 * EPS * scale;
+            let last =
+                part.level >= MOST || count > PARTS + EACH * cuts.len() || part.t[1] - part.t[0] <= 64.0 * EPS * scale;
             if again && !last {
                 next.extend(part.halves());
             } else {
@@ -124,7 +130,7 @@ fn refine(
 
 /// The highest value on a stretch, and by how much it may be wrong; −∞ where there is none.
 /// With `sign` −1 the highest of the values' negatives.
-pub(super) fn highest(asker: &mut Asker<'_>, course: &Course, cuts: &[f64], sign: f64) -> [f64; 2] {
+pub(super) fn highest(asker: &mut Asker<'_>, course: &Course<'_>, cuts: &[f64], sign: f64) -> [f64; 2] {
     let top = |p: &Part| p.v.iter().map(|v| sign * v).filter(|v| !v.is_nan()).fold(f64::NEG_INFINITY, f64::max);
     let best = std::cell::Cell::new(f64::NEG_INFINITY);
     let mut above = f64::NEG_INFINITY;
@@ -142,7 +148,12 @@ pub(super) fn highest(asker: &mut Asker<'_>, course: &Course, cuts: &[f64], sign
 }
 
 /// The places where the value crosses one of `values`, in order: place, bound on its error, value.
-pub(super) fn crossings(asker: &mut Asker<'_>, course: &Course, cuts: &[f64], values: &[f64]) -> Vec<(f64, f64, f64)> {
+pub(super) fn crossings(
+    asker: &mut Asker<'_>,
+    course: &Course<'_>,
+    cuts: &[f64],
+    values: &[f64],
+) -> Vec<(f64, f64, f64)> {
     let mut known: Vec<(f64, f64)> = Vec::new();
     let near = |part: &Part| {
         let ([low, high], margin) = (part.range(), part.margin());
@@ -160,7 +171,7 @@ pub(super) fn crossings(asker: &mut Asker<'_>, course: &Course, cuts: &[f64], va
 /// The places where the value crosses one of `values` between neighbouring samples of it.
 pub(super) fn between(
     asker: &mut Asker<'_>,
-    course: &Course,
+    course: &Course<'_>,
     samples: &[(f64, f64)],
     values: &[f64],
     scale: f64,
