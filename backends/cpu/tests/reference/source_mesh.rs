@@ -142,7 +142,7 @@ fn numbers_that_are_not_there_are_refused() {
     };
     let error = |shape: Shape| told(&try_draw(&all, &[shape], &along_z(0.31, 0.47), &evaluated()).unwrap_err());
     let missing = error(Shape::new(parts.mesh(), look(8, 3)));
-    assert!(missing.contains("component 3") && missing.contains("has 1"), "{missing}");
+    assert!(missing.contains("component 3") && missing.contains("with 1"), "{missing}");
     let few = error(Shape::new(parts.mesh(), look(7, 0)));
     assert!(few.contains("7 vertices") && few.contains('8'), "{few}");
     let alpha = -(-1.0f64).exp_m1();

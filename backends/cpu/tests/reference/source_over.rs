@@ -257,3 +257,21 @@ fn noise_ends_with_a_wide_estimate() {
     assert!((made.color[0][3] - alpha).abs() < 0.02, "{:?}", made.color[0]);
     assert!(made.not_certified == 1 && made.samples < 1_000_000, "{} {}", made.widest, made.samples);
 }
+
+/// What is narrow in a table is narrow on the ray: a peak of a millionth of the range is found.
+#[test]
+fn narrow_peaks_of_tables_are_not_overlooked() {
+    let data = volume_of([4, 4, 5], |[x, y, z]| ((x * 7 + y * 5 + z * 3) as f64 * 0.7).sin());
+    let all = registry(&[]);
+    for width in [1e-2, 1e-4, 1e-6] {
+        let red = [1.0, 0.2, 0.1];
+        let points = [point(0.3 - width, red, 0.0), point(0.3, red, 0.9), point(0.3 + width, [0.0, 1.0, 0.0], 0.0)];
+        let shape = lut(&data, table(&points), 0.5 * width);
+        for frame in views() {
+            let [found, wanted] =
+                [evaluated(), Default::default()].map(|o| draw(&all, std::slice::from_ref(&shape), &frame, &o));
+            assert!(wanted.color.iter().any(|c| c[3] > 0.1));
+            alike(&found.color, &wanted.color, 1e-7);
+        }
+    }
+}

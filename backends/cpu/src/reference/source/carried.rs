@@ -14,6 +14,7 @@ use volact_shaders::{Program, eval::Field};
 
 use super::program::{Course, Source};
 use crate::reference::{
+    cubic::Cubic,
     line::EPS,
     mark::{Mark, Stretches},
     mesh::{Crossing, Mesh, Step, Trace, restrict},
@@ -73,6 +74,14 @@ impl Cell {
         let found = self.numbers.iter().find(|(f, _)| *f == field);
         // One that was left out is 0.
         found.map_or(0.0, |(_, [start, slope])| start + slope * (t - self.t[0]))
+    }
+}
+
+impl Cell {
+    /// The numbers of vertices between two places, as cubics over 0 to 1.
+    pub fn linear(&self, [start, end]: [f64; 2]) -> impl Iterator<Item = Cubic> {
+        let numbers = self.numbers.iter().filter(|(field, _)| matches!(field, Field::Attribute(_)));
+        numbers.map(move |(_, [first, slope])| [first + slope * (start - self.t[0]), slope * (end - start), 0.0, 0.0])
     }
 }
 

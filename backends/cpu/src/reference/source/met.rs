@@ -166,7 +166,8 @@ impl<'a> Met<'a> {
             let found = match &sampling.counting {
                 None => search::crossings(asker, course, &self.cuts(lane, stretch), values),
                 Some(counting) => {
-                    let places = self.places(stretch, counting, sampling.between_ends);
+                    let segments = counting.segments_of(self.anchor, stretch.t);
+                    let places: Vec<_> = std::iter::once(stretch.t[0]).chain(segments.map(|s| s.end)).collect();
                     let at: Vec<_> = places.iter().map(|t| Sample { t: *t, ..Sample::default() }).collect();
                     let known: Vec<_> = places.iter().copied().zip(asker.values(course, &at)).collect();
                     let scale = stretch.t[0].abs().max(stretch.t[1].abs()).max(self.course.at.abs().max_element());
@@ -202,16 +203,6 @@ impl<'a> Met<'a> {
         };
         let alpha = bounds(3);
         (alpha[1] > 0.0).then(|| Hit::new(mark, [0, 1, 2].map(bounds), alpha))
-    }
-
-    /// Where a lattice has its samples on a stretch.
-    fn places(&self, stretch: &Stretch, counting: &Counting, ends: bool) -> Vec<f64> {
-        let segments = counting.segments_of(self.anchor, stretch.t);
-        if ends {
-            std::iter::once(stretch.t[0]).chain(segments.map(|s| s.end)).collect()
-        } else {
-            segments.map(|s| s.middle()).collect()
-        }
     }
 
     /// The one number of the ray, and what it shows.

@@ -58,11 +58,14 @@ fn refused(shape: &ResolvedShape, program: &Program) -> Option<(String, &'static
         }
     }
     let component = shape.int("component").filter(|_| program.declaration().parameter("component").is_some());
-    let few = |v: &ParameterValue| match (v, component) {
-        (ParameterValue::Attribute(a), Some(wanted)) if wanted >= a.components as i64 => Some((wanted, a.components)),
-        _ => None,
-    };
-    shape.parameters.values().find_map(few).map(|(wanted, count)| {
-        (format!("component {wanted} of an attribute that has {count}"), "name a component that is there")
+    let wanted = component.map_or(0, |c| usize::try_from(c).unwrap_or(usize::MAX));
+    shape.parameters.iter().find_map(|(name, value)| {
+        let count = match value {
+            ParameterValue::Volume(texture) => texture.volume().desc().components,
+            ParameterValue::Attribute(attribute) => attribute.components,
+            _ => return None,
+        };
+        let what = format!("component {wanted} of parameter {name:?} with {count}");
+        (wanted >= count).then_some((what, "name a component that is there"))
     })
 }
