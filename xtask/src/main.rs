@@ -1,6 +1,7 @@
 //! What people who work on Volact repeat: `cargo xtask --help`.
 
 mod check;
+mod evaluator;
 mod header;
 mod mesh_peers;
 mod new_plugin;
@@ -34,6 +35,8 @@ enum Task {
     Header,
     /// Make a plugin's crate that builds, tests itself and draws something.
     NewPlugin(new_plugin::Args),
+    /// Time shaders that are drawn by evaluating their sources, beside a kernel.
+    Evaluator(evaluator::Args),
     /// Time `cpu` over picture sizes, volume sizes and threads.
     Scaling,
 }
@@ -47,6 +50,7 @@ fn main() -> anyhow::Result<()> {
         Task::MeshPeers(args) => mesh_peers::run(&args),
         Task::Header => header::run(),
         Task::NewPlugin(args) => new_plugin::run(&args),
+        Task::Evaluator(args) => evaluator::run(&args),
         Task::Scaling => scaling::run(),
     }
 }

@@ -6,9 +6,14 @@ use volact_core::camera::LinearRays;
 use super::{
     fetch::{self, Access, Base, Fetch, Voxels},
     over::{self, Classes, Pixels},
-    packet::{Bundle, Cuts, Packet, Place, Span},
+    packet::{Bundle, Cuts, Lanes, Packet, Place, Span},
     preintegrate::SegmentPairs,
     reduce::{self, Reduced},
+    shaded::{
+        self, Skip, batch,
+        field::{self, Field, Places},
+        lookup::{self, Lookup},
+    },
     simd::{LANES, Plain, Simd, Unit},
     sweep::{
         gather::{self, Chunk, Row},
@@ -211,6 +216,68 @@ by_unit! {
         counts: &mut Counts
     ) -> i64,
     S => gather::gather::<S>(job, at, first, done, chunk, counts)
+}
+
+#[inline(always)]
+unsafe fn values_by<S: Simd>(of: &Field<'_>, p: Places<'_>, out: &mut [f32]) {
+    // SAFETY: the caller's promises.
+    by_access!(of.voxels().access(), F => unsafe { field::values::<S, F>(of, p, out) });
+}
+
+#[inline(always)]
+unsafe fn gradients_by<S: Simd>(of: &Field<'_>, p: Places<'_>, out: &mut [&mut [f32]]) {
+    // SAFETY: the caller's promises.
+    by_access!(of.voxels().access(), F => unsafe { field::gradients::<S, F>(of, p, out) });
+}
+
+/// # Safety
+/// None of its own: it is unsafe so that it is called like the kernels.
+#[inline(always)]
+unsafe fn places_by(lines: &[[&Lanes; 2]; 3], rows: &[batch::Row], shift: f64, out: [&mut [f32]; 3]) {
+    batch::places(lines, rows, shift, out);
+}
+
+by_unit! {
+    /// The positions of rows of samples along lines, by axis.
+    places(lines: &[[&Lanes; 2]; 3], rows: &[batch::Row], shift: f64, out: [&mut [f32]; 3]),
+    => places_by(lines, rows, shift, out)
+}
+
+by_unit! {
+    /// Lays the media of rows behind what sixteen rays have seen.
+    composite(rows: &[batch::Row], medium: &[&[f32]; 4], seen: &mut [[f32; LANES]; 4], alphas: &mut [[f32; LANES]]),
+    S => shaded::composite::<S>(rows, medium, seen, alphas)
+}
+
+by_unit! {
+    /// Values of a volume at places, in data units.
+    field_values(of: &Field<'_>, p: Places<'_>, out: &mut [f32]),
+    S => values_by::<S>(of, p, out)
+}
+
+by_unit! {
+    /// Gradients of a volume at places, in data units a world unit.
+    field_gradients(of: &Field<'_>, p: Places<'_>, out: &mut [&mut [f32]]),
+    S => gradients_by::<S>(of, p, out)
+}
+
+by_unit! {
+    /// What a table says of values.
+    classified(table: &Lookup, values: &[f32], out: &mut [&mut [f32]], medium: bool),
+    S => lookup::classified::<S>(table, values, out, medium)
+}
+
+by_unit! {
+    /// What lengths of sixteen media add: red, green, blue and extinction by lane.
+    absorb(medium: &[&[f32; LANES]; 4], length: f32, out: &mut Row),
+    S => shaded::absorb::<S>(medium, length, out)
+}
+
+by_unit! {
+    /// Finds the rows of a chunk in which a program may be seen; returns the next segment in which
+    /// there may be something.
+    visible(skip: &Skip<'_>, at: (&Packet, &Cuts), place: (f64, i64), done: u32, found: &mut shaded::Rows) -> i64,
+    S => shaded::visible::<S>(skip, at, place, done, found)
 }
 
 by_unit! {

@@ -1,18 +1,35 @@
 //! A lookup table as programs ask for it: straight colour and opacity, or colour and extinction,
 //! by values in data units.
 
+#![expect(unsafe_code, reason = "kernels of a vector unit")]
+#![expect(clippy::needless_range_loop, reason = "a lane indexes several arrays")]
+
 use volact_core::table::ResolvedTable;
 
-use crate::fast::direct::ln;
+use crate::fast::{
+    simd::{LANES, Simd},
+    sweep::{
+        lane::Lane,
+        piece::{Run, Sight, cut},
+    },
+    walk::ALL,
+};
 
-/// Bins between the first and the last control point.
+/// Most control points that are found by comparing with each of them.
+const FEW: usize = 24;
+/// Bins between the first and the last control point, where there are more.
 const BINS: usize = 1024;
 
-/// A table whose control points are found by the bin of a value.
+/// A table of which each value's stretch between two control points is found without branches.
 #[derive(Debug)]
 pub struct Lookup {
+    /// Values of the points, rising; after the last one infinity.
     values: Vec<f32>,
-    rgba: Vec<[f32; 4]>,
+    /// By how many points are not above a value: the line of colour and opacity there, as its
+    /// numbers at a value and their slopes.
+    lines: Vec<[[f32; 4]; 2]>,
+    /// The values at which the lines have these numbers.
+    anchors: Vec<f32>,
     /// A point not after the one that follows the bin's values.
     bins: Vec<u32>,
     low: f32,
@@ -24,75 +41,229 @@ impl Lookup {
     /// A table with the length over which its opacity is the fraction absorbed.
     pub fn new(table: &ResolvedTable, unit: f64) -> Self {
         let points = table.points();
-        let values: Vec<f32> = points.iter().map(|p| p.value as f32).collect();
-        let rgba = points.iter().map(|p| [p.color[0], p.color[1], p.color[2], p.opacity].map(|v| v as f32)).collect();
-        let (low, high) = (values[0], values[values.len() - 1]);
+        let mut values: Vec<f32> = points.iter().map(|p| p.value as f32).collect();
+        let rgba = |i: usize| {
+            let p = &points[i];
+            [p.color[0], p.color[1], p.color[2], p.opacity]
+        };
+        let last = points.len() - 1;
+        let flat = |i: usize| [rgba(i).map(|v| v as f32), [0.0; 4]];
+        let line = |i: usize| {
+            let (a, b) = (rgba(i), rgba(i + 1));
+            let width = f64::from(values[i + 1]) - f64::from(values[i]);
+            let slope = [0, 1, 2, 3].map(|c| if width > 0.0 { ((b[c] - a[c]) / width) as f32 } else { 0.0 });
+            [a.map(|v| v as f32), slope]
+        };
+        let mut lines = vec![flat(0)];
+        lines.extend((0..last).map(line));
+        lines.push(flat(last));
+        let mut anchors = vec![values[0]];
+        anchors.extend(&values);
+        let (low, high) = (values[0], values[last]);
         let scale = BINS as f32 / (high - low);
-        let scale = if scale.is_finite() && scale > 0.0 { scale } else { 0.0 };
+        let scale = if scale.is_finite() && scale > 0.0 && points.len() > FEW { scale } else { 0.0 };
         let first = |bin: usize| {
             let value = low + bin as f32 / scale;
             values.partition_point(|v| *v < value).saturating_sub(2) as u32
         };
         let bins = if scale > 0.0 { (0..=BINS).map(first).collect() } else { vec![0] };
-        Self { values, rgba, bins, low, scale, unit }
+        values.push(f32::INFINITY);
+        Self { values, lines, anchors, bins, low, scale, unit }
     }
 
-    /// Straight colour and opacity; NaN for NaN.
+    /// How many control points are not above sixteen values.
     #[inline(always)]
-    pub fn classify(&self, value: f32) -> [f32; 4] {
-        if value.is_nan() {
+    fn places(&self, value: &[f32; LANES]) -> [usize; LANES] {
+        let points = &self.values[..self.values.len() - 1];
+        if points.len() <= FEW {
+            let mut places = [0u32; LANES];
+            for point in points {
+                for l in 0..LANES {
+                    places[l] += u32::from(value[l] >= *point);
+                }
+            }
+            return places.map(|p| p as usize);
+        }
+        value.map(|value| {
+            let bin = ((value - self.low) * self.scale) as usize;
+            let mut after = self.bins[bin.min(self.bins.len() - 1)] as usize;
+            while after < points.len() && points[after] <= value {
+                after += 1;
+            }
+            after
+        })
+    }
+
+    /// Straight colour and opacity of sixteen values; NaN for NaN.
+    ///
+    /// # Safety
+    /// Called from a function compiled for `S` on a machine that has it.
+    #[inline(always)]
+    unsafe fn classify<S: Simd>(&self, value: &[f32; LANES]) -> [S::F; 4] {
+        let places = self.places(value);
+        let (mut first, mut second, mut anchor) = ([0i32; LANES], [0i32; LANES], [0f32; LANES]);
+        for l in 0..LANES {
+            let place = places[l].min(self.lines.len() - 1);
+            (first[l], second[l], anchor[l]) = (2 * place as i32, 2 * place as i32 + 1, self.anchors[place]);
+        }
+        // SAFETY: the caller's promise; each place has a line of two rows.
+        unsafe {
+            let table = self.lines.as_ptr().cast::<u8>();
+            let (from, slope) = (S::rows(table, &first), S::rows(table, &second));
+            let value = S::load(value);
+            // Infinite values stand beyond the last point, where nothing changes.
+            let bounded = S::max(S::min(value, S::splat(f32::MAX)), S::splat(f32::MIN));
+            let off = S::sub(bounded, S::load(&anchor));
+            let unknown = S::nan_bits(value);
+            let mut rgba = [off; 4];
+            for c in 0..4 {
+                rgba[c] = S::select(unknown, S::splat(f32::NAN), S::fma(slope[c], off, from[c]));
+            }
+            rgba
+        }
+    }
+
+    /// Extinctions of opacities: −ln(1 − a) over the unit distance; NaN for NaN.
+    ///
+    /// ln of the rounded u = 1 − a by Cephes' polynomial (S. Moshier, `logf`), and (1 − a − u)/u more
+    /// for what was rounded away, so that small opacities keep their digits.
+    ///
+    /// # Safety
+    /// Called from a function compiled for `S` on a machine that has it.
+    #[inline(always)]
+    unsafe fn extinction<S: Simd>(&self, a: S::F) -> S::F {
+        const SERIES: [f32; 9] = [
+            7.037_683_6e-2,
+            -1.151_461e-1,
+            1.167_699_8e-1,
+            -1.242_014_1e-1,
+            1.424_932_3e-1,
+            -1.666_805_8e-1,
+            2.000_071_4e-1,
+            -2.499_999_4e-1,
+            3.333_333e-1,
+        ];
+        // SAFETY: the caller's promise.
+        unsafe {
+            let (zero, one) = (S::splat(0.0), S::splat(1.0));
+            let u = S::max(S::sub(one, a), S::splat(f32::MIN_POSITIVE));
+            let rounded = S::sub(S::sub(one, u), a);
+            // As a power of two times a number between √½ and √2.
+            let half = S::splat_int(std::f32::consts::FRAC_1_SQRT_2.to_bits() as i32);
+            let power = S::sar::<23>(S::sub_int(S::as_int(u), half));
+            let m = S::as_float(S::sub_int(S::as_int(u), S::shl::<23>(power)));
+            let (f, e) = (S::sub(m, one), S::to_float(power));
+            let mut series = S::splat(SERIES[0]);
+            for c in &SERIES[1..] {
+                series = S::fma(series, f, S::splat(*c));
+            }
+            let square = S::mul(f, f);
+            let mut log = S::mul(S::mul(square, f), series);
+            log = S::fma(e, S::splat(-2.121_944_4e-4), log);
+            log = S::fma(S::splat(-0.5), square, log);
+            log = S::add(f, S::add(log, S::div(rounded, u)));
+            log = S::fma(e, S::splat(0.693_359_4), log);
+            let sigma = S::mul(S::sub(zero, log), S::splat((1.0 / self.unit) as f32));
+            // Comparisons with NaN hold nowhere.
+            let some = S::lt_bits(zero, a);
+            let opaque = ALL & !S::lt_bits(a, one) & some;
+            let sigma = S::select(some, sigma, S::select(S::nan_bits(a), a, zero));
+            S::select(opaque, S::splat(f32::INFINITY), sigma)
+        }
+    }
+}
+
+/// What a table says of values: straight colour with opacity, or with extinction. Rows that nobody
+/// wants are empty.
+///
+/// # Safety
+/// Called from a function compiled for `S` on a machine that has it.
+#[inline(always)]
+pub unsafe fn classified<S: Simd>(table: &Lookup, values: &[f32], out: &mut [&mut [f32]], medium: bool) {
+    for (i, value) in values.as_chunks::<LANES>().0.iter().enumerate() {
+        // SAFETY: the caller's promise.
+        unsafe {
+            let mut rgba = table.classify::<S>(value);
+            if medium {
+                rgba[3] = table.extinction::<S>(rgba[3]);
+            }
+            for (row, numbers) in out.iter_mut().zip(rgba) {
+                if let Some(to) = row.as_chunks_mut::<LANES>().0.get_mut(i) {
+                    S::store(numbers, to);
+                }
+            }
+        }
+    }
+}
+
+/// A lookup table over segments on which the value runs evenly.
+#[derive(Debug)]
+pub struct Segments {
+    /// The table.
+    pub table: ResolvedTable,
+    /// The length over which its opacity is the fraction absorbed.
+    pub unit: f64,
+}
+
+impl Segments {
+    /// The uniform medium that looks like a segment with values from `front` to `back` over a
+    /// `length`: colour and extinction. NaN where a number is.
+    pub fn medium(&self, [front, back, length]: [f32; 3]) -> [f32; 4] {
+        let [front, back, length] = [front, back, length].map(f64::from);
+        if front.is_nan() || back.is_nan() || !(length > 0.0) {
             return [f32::NAN; 4];
         }
-        let bin = ((value - self.low) * self.scale) as usize;
-        let mut after = self.bins[bin.min(self.bins.len() - 1)] as usize;
-        while after < self.values.len() && self.values[after] <= value {
-            after += 1;
+        let (mut lane, mut cuts) = (Lane::default(), Vec::new());
+        let run = Run { value: [front, back], table: &self.table };
+        cut([0.0, length], run, None, self.unit, &mut cuts, &mut lane.pieces);
+        let mut sight = Sight { color: [0.0; 4], depth: f64::INFINITY, threshold: 2.0 };
+        lane.pass(&[], 0.0, &mut sight);
+        let [r, g, b, a] = sight.color;
+        if a > 0.0 {
+            return [r / a, g / a, b / a, -(-a.min(1.0)).ln_1p() / length].map(|v| v as f32);
         }
-        if after == 0 || after == self.values.len() {
-            return self.rgba[after.min(self.values.len() - 1)];
-        }
-        let (a, b) = (self.rgba[after - 1], self.rgba[after]);
-        let (from, to) = (self.values[after - 1], self.values[after]);
-        let t = (value - from) / (to - from);
-        [0, 1, 2, 3].map(|c| a[c] + t * (b[c] - a[c]))
-    }
-
-    /// Extinction of an opacity: −ln(1 − a) over the unit distance; none for NaN.
-    #[inline(always)]
-    pub fn extinction(&self, opacity: f32) -> f32 {
-        let a = f64::from(opacity);
-        if a >= 1.0 {
-            f32::INFINITY
-        } else if a > 0.0 {
-            (-ln(1.0 - a) / self.unit) as f32
-        } else {
-            0.0
-        }
+        let [r, g, b, _] = self.table.classify(front);
+        [r, g, b, 0.0].map(|v| v as f32)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fast::{dispatch, simd::Unit};
     use volact_core::{ControlPoint, LookupTable};
 
     #[test]
     fn what_is_looked_up_is_the_table() {
         let point = |value: f64, opacity: f64| ControlPoint { value, color: [opacity, 0.5, 1.0 - opacity], opacity };
-        let points = [point(-3.0, 0.0), point(0.0, 0.4), point(0.0, 0.9), point(0.01, 0.2), point(90.0, 1.0)];
-        let table = LookupTable::from_points(points).unwrap().resolve([0.0, 1.0]);
-        let lookup = Lookup::new(&table, 2.5);
-        for i in -400..10_000 {
-            let value = i as f32 * 0.01;
-            let (found, wanted) = (lookup.classify(value), table.classify(f64::from(value)));
-            assert!((0..4).all(|c| (f64::from(found[c]) - wanted[c]).abs() < 2e-4 && !found[c].is_nan()), "{value}");
-            let (sigma, a) = (f64::from(lookup.extinction(found[3])), f64::from(found[3]));
-            let wanted = if a >= 1.0 { f64::INFINITY } else { -(-a).ln_1p() / 2.5 };
-            assert!(sigma == wanted || (sigma - wanted).abs() <= 2e-7 * wanted, "{value}: {sigma}, wanted {wanted}");
+        let few = vec![point(-3.0, 0.0), point(0.0, 0.4), point(0.0, 0.9), point(0.01, 0.2), point(90.0, 1.0)];
+        let mut many: Vec<_> = (0..60).map(|i| point(f64::from(i), f64::from(i % 7) / 7.0)).collect();
+        many.insert(30, point(30.0, 1.0));
+        let faint = vec![point(0.0, 0.0), point(1.0, 1e-6), point(2.0, 1e-3), point(3.0, 0.999), point(4.0, 0.4)];
+        for unit in [Unit::Plain, Unit::Avx2, Unit::Avx512].into_iter().filter(|u| u.available()) {
+            let look = |lookup: &Lookup, value: f32, medium: bool| {
+                let mut rows = [[0f32; LANES]; 4];
+                let mut out = rows.each_mut().map(|row| row.as_mut_slice());
+                dispatch::classified(unit, lookup, &[value; LANES], &mut out, medium);
+                rows.map(|row| f64::from(row[LANES - 1]))
+            };
+            for points in [few.clone(), many.clone(), faint.clone()] {
+                let table = LookupTable::from_points(points).unwrap().resolve([0.0, 1.0]);
+                let lookup = Lookup::new(&table, 2.5);
+                let extremes = [f32::INFINITY, f32::NEG_INFINITY, 1e30, -1e30, f32::MAX, 0.0];
+                let values: Vec<f32> = (-400..10_000).map(|i| i as f32 * 0.01).chain(extremes).collect();
+                for value in values {
+                    let (found, wanted) = (look(&lookup, value, false), table.classify(f64::from(value)));
+                    assert!((0..4).all(|c| (found[c] - wanted[c]).abs() < 2e-4), "{value}: {found:?}");
+                    let (sigma, a) = (look(&lookup, value, true)[3], found[3]);
+                    let wanted = if a >= 1.0 { f64::INFINITY } else { -(-a).ln_1p() / 2.5 };
+                    let close = sigma == wanted || (sigma - wanted).abs() <= 4e-7 * wanted;
+                    assert!(close, "{unit:?}: opacity {a} has {sigma}, not {wanted}");
+                }
+                assert!(look(&lookup, f32::NAN, true).iter().all(|v| v.is_nan()));
+            }
+            let one = LookupTable::from_points([point(7.0, 0.3)]).unwrap().resolve([0.0, 1.0]);
+            assert!((look(&Lookup::new(&one, 1.0), 1e30, false)[3] - 0.3).abs() < 1e-7);
         }
-        assert!(lookup.classify(f32::NAN)[3].is_nan());
-        assert_eq!(lookup.extinction(f32::NAN), 0.0);
-        let one = LookupTable::from_points([point(7.0, 0.3)]).unwrap().resolve([0.0, 1.0]);
-        assert_eq!(Lookup::new(&one, 1.0).classify(1e30)[3], 0.3);
     }
 }
