@@ -44,7 +44,8 @@ pub fn run(args: &Args) -> Result<()> {
     let case = |name: &'static str, shader: &str, recognise: bool| -> Result<Case> {
         let shape = shape.named(name);
         shape.set_shader(shader);
-        let options = [("sample_distance", 1.0.into()), ("classification", "post".into()), ("recognise", recognise.into())];
+        let options =
+            [("sample_distance", 1.0.into()), ("classification", "post".into()), ("recognise", recognise.into())];
         let options: Options = options.map(|(name, value)| (name.to_owned(), value)).into();
         let action = registry.action("cpu", &options)?;
         Ok(Case { name, shape, action, times: Vec::new(), samples: 0 })

@@ -34,7 +34,8 @@ impl<F: Real> Kernel<F> {
     /// none are known.
     pub fn transparent_with(&self) -> Option<(usize, usize)> {
         let mut known: BTreeMap<Reg, Known> = BTreeMap::new();
-        known.extend(self.float_constants.iter().filter(|(_, v)| v.to_f64() == 0.0).map(|(reg, _)| (*reg, Known::Zero)));
+        known
+            .extend(self.float_constants.iter().filter(|(_, v)| v.to_f64() == 0.0).map(|(reg, _)| (*reg, Known::Zero)));
         known.extend(self.inputs.iter().filter_map(|(input, reg)| match input.field {
             Field::Position(axis) if input.sample == 0 => Some((*reg, Known::Position(axis))),
             _ => None,
@@ -73,9 +74,12 @@ impl<F: Real> Kernel<F> {
                 let factor = |v: Option<Known>| v.filter(|v| matches!(v, Known::Zero | Known::Vanishes(..)));
                 one(to, factor(of(a)).or(factor(of(b))))
             }
-            Inst::Float2(Float2::Divide, to, [a, _]) | Inst::Float1(Float1::Negate | Float1::Abs | Float1::Sqrt | Float1::Saturate | Float1::Absorption, to, a) => {
-                one(to, of(a).filter(|v| matches!(v, Known::Zero | Known::Vanishes(..))))
-            }
+            Inst::Float2(Float2::Divide, to, [a, _])
+            | Inst::Float1(
+                Float1::Negate | Float1::Abs | Float1::Sqrt | Float1::Saturate | Float1::Absorption,
+                to,
+                a,
+            ) => one(to, of(a).filter(|v| matches!(v, Known::Zero | Known::Vanishes(..)))),
             Inst::Copy { class: Class::Float, to, from } => one(to, of(from)),
             Inst::Select { class: Class::Float, to, accept, reject, .. } => {
                 one(to, of(accept).zip(of(reject)).and_then(|(a, b)| both(a, b)))

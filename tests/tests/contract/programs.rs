@@ -9,8 +9,7 @@ use volact_conformance::{
 };
 use volact_core::{
     Appearance, Block, Compositing, Declaration, Frame, FrameDesc, ParameterDecl, ParameterType, ParameterValue,
-    Registry, ScalarType, ShaderEntry, ShaderText, Shape, SliceStyle, Volume, VolumeDesc,
-    VolumeTexture,
+    Registry, ScalarType, ShaderEntry, ShaderText, Shape, SliceStyle, Volume, VolumeDesc, VolumeTexture,
     glam::{DAffine3, DMat3, DVec3},
     parameter::Kind,
 };

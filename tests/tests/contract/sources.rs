@@ -112,6 +112,54 @@ fn kernels_draw_what_the_sources_of_their_shaders_say() {
     }
 }
 
+/// Shaders without a kernel, in f32 and in f64 on the same lattice.
+#[test]
+fn sources_in_f32_are_those_in_f64() {
+    let mut random = Random(23);
+    let mut all = registry();
+    for entry in volact_shaders::builtin().unwrap() {
+        if all.shaders().get(&entry.declaration.name).is_none() {
+            all.add_shader(entry).unwrap();
+        }
+    }
+    for round in 0..4 {
+        let data = noise(&mut random, [ScalarType::U8, ScalarType::F32][round % 2], true);
+        let other = noise(&mut random, ScalarType::U16, true);
+        let table = || colors(&[(60.0, [0.2, 0.4, 0.9], 0.0), (110.0, [1.0, 0.6, 0.2], 0.3), (150.0, [1.0; 3], 0.6)]);
+        let (texture, desc) = (VolumeTexture::new(&data), view(&mut random));
+        let look = |name: &str| Appearance::new(name).with("volume", texture.clone());
+        let lit = |name: &str| look(name).with("lookup_table", table()).with("unit_distance", 1.0);
+        let steep = colors(&[(0.0, [0.5; 3], 0.0), (30.0, [1.0; 3], 1.0)]);
+        let labels = colors(&[(0.0, [0.0; 3], 0.0), (120.0, [1.0, 0.2, 0.2], 0.3), (200.0, [0.2, 1.0, 0.2], 0.2)]);
+        let looks = [
+            lit("gradient").with("light", "directional").with("lightdir", DVec3::new(0.3, -0.5, 0.8)),
+            lit("gradient").with("model", "phong"),
+            lit("tangent_space").with("lightdir", DVec3::new(0.3, -0.5, 0.8)),
+            lit("lut2d").with("gradient_table", steep),
+            lit("blend2").with("volume2", VolumeTexture::new(&other)).with("lookup_table2", table()),
+            Appearance::new("labels")
+                .with("labels", texture.clone())
+                .with("label_table", labels)
+                .with("unit_distance", 1.0),
+            look("isosurface")
+                .with("surfaces", colors(&[(100.0, [1.0, 0.5, 0.2], 0.5), (130.0, [0.5, 0.5, 1.0], 1.0)])),
+        ];
+        for look in looks {
+            let (shader, shapes) = (look.shader.clone(), [Shape::around(&data, look)]);
+            shapes[0].set_transform(DAffine3::from_rotation_y(0.4));
+            let found = picture(&all, &Setup::post(0.17), &shapes, &desc);
+            let wanted = picture(&all, &Setup::rays(0.17), &shapes, &desc);
+            assert!(wanted.iter().any(|c| c[3] > 0.05), "{shader}, round {round}");
+            let off: Vec<f64> = found.iter().zip(&wanted).map(|(a, b)| max_error(&[*a], &[*b])).collect();
+            // Labels and surfaces that rays just graze jump: one pixel in a hundred may.
+            let jumps = matches!(shader.as_str(), "labels" | "isosurface");
+            let allowed = if jumps { off.len() / 100 } else { 0 };
+            let far = off.iter().filter(|e| **e > 2e-4).count();
+            assert!(far <= allowed, "{shader}, round {round}: {far} pixels are off by more than 2e-4: {off:?}");
+        }
+    }
+}
+
 #[test]
 fn an_attribute_by_its_source_tends_to_the_kernel_cell_by_cell() {
     let mesh = || bent([4, 5, 3], DVec3::new(3.0, 4.0, 2.0), 0.15);
@@ -120,9 +168,7 @@ fn an_attribute_by_its_source_tends_to_the_kernel_cell_by_cell() {
     let shape = [Shape::new(mesh(), look_attribute(numbers, warm, 1.0))];
     let desc = square(DVec3::new(1.5, 2.0, 1.0), DVec3::new(2.0, -6.0, 3.0), 6.0, 20);
     let kernel = Setup::cpu().with("termination", 0.0).colors(&shape, &desc);
-    let error = |step: f64| {
-        max_error(&Setup::post(step).with("recognise", false).colors(&shape, &desc), &kernel)
-    };
+    let error = |step: f64| max_error(&Setup::post(step).with("recognise", false).colors(&shape, &desc), &kernel);
     within("step 0.2", error(0.2), 4e-3);
     within("step 0.05", error(0.05), 3e-4);
     within("step 0.0125", error(0.0125), 4e-5);
@@ -165,8 +211,11 @@ fn pre_integration_by_source_is_that_of_the_kernel() {
     let text = "fn shade(s: Sample) -> Medium { return lookup_table(volume(s.position)); }\n\
                 fn shade_segment(front: Sample, back: Sample) -> Medium {\n  \
                 return lookup_table_segment(volume(front.position), volume(back.position), front.step);\n}";
-    let parameters =
-        [("volume", ParameterType::Volume), ("lookup_table", ParameterType::Table), ("unit_distance", ParameterType::Float)];
+    let parameters = [
+        ("volume", ParameterType::Volume),
+        ("lookup_table", ParameterType::Table),
+        ("unit_distance", ParameterType::Float),
+    ];
     let all = with("ends", Compositing::Over, &parameters, text);
     let thin = colors(&[(80.0, [1.0, 0.2, 0.1], 0.0), (90.0, [1.0, 0.9, 0.1], 0.6), (100.0, [0.1, 0.2, 1.0], 0.0)]);
     let shape = lut(&ball([9, 8, 10], ScalarType::U8), thin, 1.0);
@@ -214,9 +263,8 @@ fn what_is_skipped_changes_no_bit_of_a_source() {
         let shapes = [lut(&data, sparse, 1.0)];
         let direction = random.vector() * 2.0 - 1.0;
         let desc = square(DVec3::splat(15.0), direction * 60.0, 36.0, 16);
-        let drawn = |skipping: bool| {
-            Setup::post(0.2).with("recognise", false).with("skipping", skipping).draw(&shapes, &desc)
-        };
+        let drawn =
+            |skipping: bool| Setup::post(0.2).with("recognise", false).with("skipping", skipping).draw(&shapes, &desc);
         let (with, without) = (drawn(true), drawn(false));
         assert!(identical(&with, &without), "round {round}");
         assert!(with.statistics.samples < without.statistics.samples, "round {round}");
@@ -363,12 +411,18 @@ fn shading_once_a_ray_knows_where() {
 #[test]
 fn attributes_reach_the_program() {
     let text = "fn shade(s: Sample) -> Medium { return Medium(0.1 * tint_components(s).xyz, heat(s)); }";
-    let all = with("carried", Compositing::Over, &[("heat", ParameterType::Attribute), ("tint", ParameterType::Attribute)], text);
+    let all = with(
+        "carried",
+        Compositing::Over,
+        &[("heat", ParameterType::Attribute), ("tint", ParameterType::Attribute)],
+        text,
+    );
     let block = Block::new(DVec3::ZERO, DVec3::new(1.0, 2.0, 1.0)).unwrap();
     let points = block.tessellate().unwrap().vertices;
     let heat: Vec<f64> = points.iter().map(|p| 0.1 + 0.4 * p.y).collect();
     let tint: Vec<f32> = points.iter().flat_map(|p| [p.x, 2.0, p.z].map(|v| v as f32)).collect();
-    let attribute = |name: &str, scalar, components, buffer| volact_core::Attribute::new(name, scalar, components, buffer).unwrap();
+    let attribute =
+        |name: &str, scalar, components, buffer| volact_core::Attribute::new(name, scalar, components, buffer).unwrap();
     let look = Appearance::new("carried")
         .with("heat", attribute("heat", ScalarType::F64, 1, volact_core::Buffer::from_vec(heat)))
         .with("tint", attribute("tint", ScalarType::F32, 3, volact_core::Buffer::from_vec(tint)));

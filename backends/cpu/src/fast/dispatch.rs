@@ -224,12 +224,6 @@ unsafe fn values_by<S: Simd>(of: &Field<'_>, p: Places<'_>, out: &mut [f32]) {
     by_access!(of.voxels().access(), F => unsafe { field::values::<S, F>(of, p, out) });
 }
 
-#[inline(always)]
-unsafe fn gradients_by<S: Simd>(of: &Field<'_>, p: Places<'_>, out: &mut [&mut [f32]]) {
-    // SAFETY: the caller's promises.
-    by_access!(of.voxels().access(), F => unsafe { field::gradients::<S, F>(of, p, out) });
-}
-
 /// # Safety
 /// None of its own: it is unsafe so that it is called like the kernels.
 #[inline(always)]
@@ -258,7 +252,7 @@ by_unit! {
 by_unit! {
     /// Gradients of a volume at places, in data units a world unit.
     field_gradients(of: &Field<'_>, p: Places<'_>, out: &mut [&mut [f32]]),
-    S => gradients_by::<S>(of, p, out)
+    S => field::gradients::<S>(of, p, out)
 }
 
 by_unit! {

@@ -1,6 +1,8 @@
 //! Shapes that are one picture each: composited by maximum, minimum, average or add.
 
-use volact_core::{ActionError, Clip, Compositing, LookupTable, lattice::Lattice, resolve::ResolvedShape, table::ResolvedTable};
+use volact_core::{
+    ActionError, Clip, Compositing, LookupTable, lattice::Lattice, resolve::ResolvedShape, table::ResolvedTable,
+};
 
 use super::{
     bent::{Bent, local},

@@ -111,7 +111,8 @@ mod tests {
 
     #[test]
     fn opacities_are_those_of_lengths() {
-        let depths = [0.0, 1e-30, 1e-7, 1e-4, 0.01, 0.2, 0.34, 0.35, 0.69, 0.7, 1.0, 3.0, 16.0, 90.0, 1e30, f32::INFINITY];
+        let depths =
+            [0.0, 1e-30, 1e-7, 1e-4, 0.01, 0.2, 0.34, 0.35, 0.69, 0.7, 1.0, 3.0, 16.0, 90.0, 1e30, f32::INFINITY];
         for unit in [Unit::Plain, Unit::Avx2, Unit::Avx512].into_iter().filter(|u| u.available()) {
             for length in [1.0, 0.37, 1e4] {
                 let sigma = depths.map(|d| d / length);

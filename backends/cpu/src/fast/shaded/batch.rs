@@ -37,12 +37,15 @@ pub struct Row {
     pub length: [f32; LANES],
     /// What the compositing made of values.
     pub value: [f32; LANES],
+    /// Where all lanes have one `t` and length: a `t` a little before, from which on positions are
+    /// made in single precision. It must not depend on what is skipped. Else NaN.
+    pub base: f64,
 }
 
 impl Row {
     /// Samples at `t` for lengths, in some lanes.
     pub fn new(number: usize, live: u32, t: Lanes, length: [f32; LANES]) -> Self {
-        Self { number, live, t, length, value: [0.0; LANES] }
+        Self { number, live, t, length, value: [0.0; LANES], base: f64::NAN }
     }
 
     /// A function of the lanes, the idle ones like the first live one: nothing may come of where
@@ -168,8 +171,10 @@ impl<'a> Evaluator<'a> {
         let mut at = 0;
         while let Some(input) = self.inputs.get(at) {
             let shift = self.shift(*input);
-            let position = |n: usize| matches!(self.inputs.get(at + n), Some(Input { field: Field::Position(a), sample })
-                if *sample == input.sample && usize::from(*a) == n);
+            let position = |n: usize| {
+                matches!(self.inputs.get(at + n), Some(Input { field: Field::Position(a), sample })
+                if *sample == input.sample && usize::from(*a) == n)
+            };
             if position(0) && position(1) && position(2) {
                 if let [x, y, z, ..] = &mut inputs[at..] {
                     dispatch::places(self.unit, &lines, rows, shift, [x, y, z]);
@@ -265,20 +270,35 @@ impl<'a> Evaluator<'a> {
 #[inline(always)]
 pub fn places(lines: &[[&Lanes; 2]; 3], rows: &[Row], shift: f64, out: [&mut [f32]; 3]) {
     let [x, y, z] = out;
-    let out = x.as_chunks_mut::<LANES>().0.iter_mut().zip(y.as_chunks_mut::<LANES>().0).zip(z.as_chunks_mut::<LANES>().0);
+    let out =
+        x.as_chunks_mut::<LANES>().0.iter_mut().zip(y.as_chunks_mut::<LANES>().0).zip(z.as_chunks_mut::<LANES>().0);
     let lines = lines.map(|[from, along]| [*from, *along]);
+    let along = lines.map(|[_, along]| along.map(|d| d as f32));
+    let (mut base, mut start) = (f64::NAN, [[0f32; LANES]; 3]);
     for (row, ((x, y), z)) in rows.iter().zip(out) {
-        let mut t = row.t;
-        if shift != 0.0 {
-            for l in 0..LANES {
-                t[l] += shift * f64::from(row.length[l]);
-            }
-        }
         // In places of its own, so that the compiler makes vectors of it.
         let mut at = [[0f32; LANES]; 3];
-        for a in 0..3 {
-            for l in 0..LANES {
-                at[a][l] = (lines[a][0][l] + lines[a][1][l] * t[l]) as f32;
+        if row.base.is_nan() {
+            for a in 0..3 {
+                for l in 0..LANES {
+                    let t = row.t[l] + shift * f64::from(row.length[l]);
+                    at[a][l] = (lines[a][0][l] + lines[a][1][l] * t) as f32;
+                }
+            }
+        } else {
+            if row.base != base {
+                base = row.base;
+                for a in 0..3 {
+                    for l in 0..LANES {
+                        start[a][l] = (lines[a][0][l] + lines[a][1][l] * base) as f32;
+                    }
+                }
+            }
+            let off = (row.t[0] - base) as f32 + shift as f32 * row.length[0];
+            for a in 0..3 {
+                for l in 0..LANES {
+                    at[a][l] = start[a][l] + along[a][l] * off;
+                }
             }
         }
         (*x, *y, *z) = (at[0], at[1], at[2]);

@@ -113,7 +113,8 @@ impl<'a> Crossings<'a> {
         let step = self.step;
         let lanes = || (0..LANES).filter(|l| packet.active >> l & 1 == 1);
         let chunk = CHUNK as i64;
-        let first = lanes().map(|l| (packet.start[l] / step).floor() as i64).min().unwrap_or(0).div_euclid(chunk) * chunk;
+        let first =
+            lanes().map(|l| (packet.start[l] / step).floor() as i64).min().unwrap_or(0).div_euclid(chunk) * chunk;
         let end = lanes().map(|l| (packet.end[l] / step).ceil() as i64).max().unwrap_or(0);
         let mut last = Last { t: packet.start, value: [f64::NAN; LANES] };
         for k in (first..=end).step_by(CHUNK) {
@@ -122,9 +123,7 @@ impl<'a> Crossings<'a> {
             if live == 0 {
                 return;
             }
-            let brackets = self.value.with(|worker| {
-                self.sample(packet, (k, live), rays, worker, &mut last, counts)
-            });
+            let brackets = self.value.with(|worker| self.sample(packet, (k, live), rays, worker, &mut last, counts));
             if !brackets.is_empty() {
                 self.meet(rays, brackets, left, hits);
             }
@@ -203,13 +202,7 @@ impl<'a> Crossings<'a> {
     }
 
     /// Closes in on crossings, and adds what is seen there.
-    fn meet(
-        &self,
-        rays: Rays<'_>,
-        mut brackets: Vec<Bracket>,
-        left: &mut [f32; LANES],
-        hits: &mut [Vec<Hit>; LANES],
-    ) {
+    fn meet(&self, rays: Rays<'_>, mut brackets: Vec<Bracket>, left: &mut [f32; LANES], hits: &mut [Vec<Hit>; LANES]) {
         for _ in 0..ROUNDS {
             let mut open: Vec<&mut Bracket> = brackets.iter_mut().filter(|b| b.found.is_none()).collect();
             if open.is_empty() {
@@ -220,52 +213,59 @@ impl<'a> Crossings<'a> {
         let place = |b: &Bracket| b.found.unwrap_or_else(|| b.guess());
         brackets.sort_by(|a, b| place(a).total_cmp(&place(b)));
         let places: Vec<(usize, f64, f64)> = brackets.iter().map(|b| (b.lane, place(b), b.level)).collect();
-        each_of_lanes(&places, |p| p.0, |some| {
-            self.shade.with(|worker| {
-                worker.rows.extend(some.iter().map(|lanes| {
-                    let (mut row, mut at) = (Row::new(0, 0, [0.0; LANES], [self.step as f32; LANES]), [0.0; LANES]);
-                    for &&(l, t, level) in lanes {
-                        (row.live, at[l], row.value[l]) = (row.live | 1 << l, t, level as f32);
+        each_of_lanes(
+            &places,
+            |p| p.0,
+            |some| {
+                self.shade.with(|worker| {
+                    worker.rows.extend(some.iter().map(|lanes| {
+                        let (mut row, mut at) = (Row::new(0, 0, [0.0; LANES], [self.step as f32; LANES]), [0.0; LANES]);
+                        for &&(l, t, level) in lanes {
+                            (row.live, at[l], row.value[l]) = (row.live | 1 << l, t, level as f32);
+                        }
+                        row.t = at;
+                        row
+                    }));
+                    if !self.shade.run(rays, worker) {
+                        return;
                     }
-                    row.t = at;
-                    row
-                }));
-                if !self.shade.run(rays, worker) {
-                    return;
-                }
-                for (i, lanes) in some.iter().enumerate() {
-                    for &&(l, t, _) in lanes {
-                        let color = premultiplied([0, 1, 2, 3].map(|c| worker.output(c)[i * LANES + l]));
-                        if color[3] > 0.0 {
-                            left[l] *= 1.0 - color[3];
-                            hits[l].push(Hit { t, color: color.map(f64::from) });
+                    for (i, lanes) in some.iter().enumerate() {
+                        for &&(l, t, _) in lanes {
+                            let color = premultiplied([0, 1, 2, 3].map(|c| worker.output(c)[i * LANES + l]));
+                            if color[3] > 0.0 {
+                                left[l] *= 1.0 - color[3];
+                                hits[l].push(Hit { t, color: color.map(f64::from) });
+                            }
                         }
                     }
-                }
-            });
-        });
+                });
+            },
+        );
     }
 
     /// One round.
     fn close(&self, rays: Rays<'_>, open: &mut [&mut Bracket]) {
-        let guesses: Vec<(usize, usize, f64)> =
-            open.iter().enumerate().map(|(i, b)| (i, b.lane, b.guess())).collect();
+        let guesses: Vec<(usize, usize, f64)> = open.iter().enumerate().map(|(i, b)| (i, b.lane, b.guess())).collect();
         let mut values = vec![f64::NAN; open.len()];
-        each_of_lanes(&guesses, |g| g.1, |some| {
-            self.value.with(|worker| {
-                worker.rows.extend(some.iter().map(|lanes| {
-                    let (mut row, mut at) = (Row::new(0, 0, [0.0; LANES], [self.step as f32; LANES]), [0.0; LANES]);
-                    lanes.iter().for_each(|&&(_, l, t)| (row.live, at[l]) = (row.live | 1 << l, t));
-                    row.t = at;
-                    row
-                }));
-                if self.value.run(rays, worker) {
-                    for (i, lanes) in some.iter().enumerate() {
-                        lanes.iter().for_each(|g| values[g.0] = f64::from(worker.output(0)[i * LANES + g.1]));
+        each_of_lanes(
+            &guesses,
+            |g| g.1,
+            |some| {
+                self.value.with(|worker| {
+                    worker.rows.extend(some.iter().map(|lanes| {
+                        let (mut row, mut at) = (Row::new(0, 0, [0.0; LANES], [self.step as f32; LANES]), [0.0; LANES]);
+                        lanes.iter().for_each(|&&(_, l, t)| (row.live, at[l]) = (row.live | 1 << l, t));
+                        row.t = at;
+                        row
+                    }));
+                    if self.value.run(rays, worker) {
+                        for (i, lanes) in some.iter().enumerate() {
+                            lanes.iter().for_each(|g| values[g.0] = f64::from(worker.output(0)[i * LANES + g.1]));
+                        }
                     }
-                }
-            });
-        });
+                });
+            },
+        );
         for ((bracket, (_, _, t)), value) in open.iter_mut().zip(&guesses).zip(values) {
             bracket.close(*t, value);
         }

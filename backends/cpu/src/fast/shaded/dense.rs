@@ -102,7 +102,7 @@ impl<'a> Dense<'a> {
         let length = [self.step as f32; LANES];
         let mut add = |row: usize, live: u32| {
             let t = ((first + row as i64) as f64 + 0.5) * self.step;
-            add(Row::new(row, live, [t; LANES], length));
+            add(Row { base: first as f64 * self.step, ..Row::new(row, live, [t; LANES], length) });
         };
         if let Some(skip) = &self.skip {
             return skip.rows(at, (self.step, first), done, add);
@@ -219,13 +219,7 @@ fn reached<'r>(
 }
 
 impl Batches for Dense<'_> {
-    fn entries(
-        &self,
-        rays: Rays<'_>,
-        cut: &[[f64; 2]; LANES],
-        done: u32,
-        counts: &mut Counts,
-    ) -> (gather::Row, u32) {
+    fn entries(&self, rays: Rays<'_>, cut: &[[f64; 2]; LANES], done: u32, counts: &mut Counts) -> (gather::Row, u32) {
         let (mut found, mut live) = ([[0f32; 4]; LANES], 0);
         self.medium.with(|worker| {
             self.cut(cut, done, worker, counts);

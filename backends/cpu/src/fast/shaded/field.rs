@@ -152,9 +152,8 @@ impl<'a> Field<'a> {
         }
         let p: [&[f32; LANES]; 3] = std::array::from_fn(|a| sixteen(places.p[a], first));
         let (m, o) = (self.linear, self.offset);
-        let number = |a: usize, l: usize| {
-            m.x_axis[a] * p[0][l] + (m.y_axis[a] * p[1][l] + (m.z_axis[a] * p[2][l] + o[a]))
-        };
+        let number =
+            |a: usize, l: usize| m.x_axis[a] * p[0][l] + (m.y_axis[a] * p[1][l] + (m.z_axis[a] * p[2][l] + o[a]));
         std::array::from_fn(|a| std::array::from_fn(|l| number(a, l)))
     }
 
@@ -192,49 +191,41 @@ pub unsafe fn values<S: Simd, F: Fetch>(field: &Field<'_>, p: Places<'_>, out: &
 /// [`Field::gradients`].
 ///
 /// # Safety
-/// As of [`values`].
+/// Called from a function compiled for `S` on a machine that has it.
 #[inline(always)]
-pub unsafe fn gradients<S: Simd, F: Fetch>(field: &Field<'_>, p: Places<'_>, out: &mut [&mut [f32]]) {
+pub unsafe fn gradients<S: Simd>(field: &Field<'_>, p: Places<'_>, out: &mut [&mut [f32]]) {
     let n = out.iter().map(|row| row.len()).max().unwrap_or(0);
     let half = 0.5 * field.units.scale as f32;
     for first in (0..n).step_by(LANES) {
-        // SAFETY: the caller's promises.
+        let mut at = [[0f32; LANES]; 3];
+        // SAFETY: the caller's promise.
         unsafe {
-            let at = field.at::<S>(p, first);
-            // Written out: what is called in a closure is not compiled for the unit.
-            let [low, high] = field.roi;
-            let x = S::min(S::max(at[0], S::splat(low.x)), S::splat(high.x));
-            let y = S::min(S::max(at[1], S::splat(low.y)), S::splat(high.y));
-            let z = S::min(S::max(at[2], S::splat(low.z)), S::splat(high.z));
-            // Along each axis of the data, over one voxel either way, up to the data's edge.
-            let (one, half) = (S::splat(1.0), S::splat(half));
-            let mut along = [S::splat(0.0); 3];
+            let inside = field.at::<S>(p, first);
             for a in 0..3 {
-                let (mut after, mut before) = ([x, y, z], [x, y, z]);
-                after[a] = S::add(after[a], one);
-                before[a] = S::sub(before[a], one);
-                let after = F::fetch::<S>(&field.whole, &field.data, after);
-                let before = F::fetch::<S>(&field.whole, &field.data, before);
-                along[a] = S::mul(half, S::sub(after, before));
+                let (low, high) = (S::splat(field.roi[0][a]), S::splat(field.roi[1][a]));
+                S::store(S::min(S::max(inside[a], low), high), &mut at[a]);
             }
-            for (c, row) in out.iter_mut().enumerate() {
-                let Some(row) = row.get_mut(first..).and_then(<[f32]>::first_chunk_mut) else { continue };
-                if p.maps.is_empty() {
-                    // The transpose of the map to samples.
-                    let column = field.linear.col(c);
-                    let sum = S::mul(S::splat(column.x), along[0]);
-                    let sum = S::fma(S::splat(column.y), along[1], sum);
-                    S::store(S::fma(S::splat(column.z), along[2], sum), row);
-                    continue;
-                }
-                let mut by_axis = [[0f32; LANES]; 3];
-                for a in 0..3 {
-                    S::store(along[a], &mut by_axis[a]);
-                }
-                for l in 0..LANES {
-                    let column = field.slope(p, first + l).col(c);
-                    row[l] = column.x * by_axis[0][l] + column.y * by_axis[1][l] + column.z * by_axis[2][l];
-                }
+        }
+        // Along each axis of the data, over one voxel either way, up to the data's edge.
+        let mut along = [[0f32; LANES]; 3];
+        for a in 0..3 {
+            let (mut after, mut before) = ([0f32; LANES], [0f32; LANES]);
+            let here = at[a];
+            at[a] = here.map(|v| v + 1.0);
+            dispatch::numbers(field.unit, &field.whole, &field.data, &at, &mut after);
+            at[a] = here.map(|v| v - 1.0);
+            dispatch::numbers(field.unit, &field.whole, &field.data, &at, &mut before);
+            at[a] = here;
+            for l in 0..LANES {
+                along[a][l] = half * (after[l] - before[l]);
+            }
+        }
+        for (c, row) in out.iter_mut().enumerate() {
+            let Some(row) = row.get_mut(first..).and_then(<[f32]>::first_chunk_mut::<LANES>) else { continue };
+            for l in 0..LANES {
+                // The transpose of the map to samples.
+                let column = field.slope(p, first + l).col(c);
+                row[l] = column.x * along[0][l] + column.y * along[1][l] + column.z * along[2][l];
             }
         }
     }

@@ -94,7 +94,12 @@ impl<'a> Flattened<'a> {
             if worker.rows.len() == ROWS {
                 self.evaluate(rays, worker, reduced, counts);
             }
-            worker.rows.push(Row::new(0, live, segments.map(|[a, b]| 0.5 * (a + b)), segments.map(|[a, b]| (b - a) as f32)));
+            worker.rows.push(Row::new(
+                0,
+                live,
+                segments.map(|[a, b]| 0.5 * (a + b)),
+                segments.map(|[a, b]| (b - a) as f32),
+            ));
         };
         add(cuts.front, worker);
         let [first, last] = cuts.whole().unwrap_or([0, 0]);
@@ -107,13 +112,7 @@ impl<'a> Flattened<'a> {
     }
 
     /// Evaluates the rows at hand and takes their values.
-    fn evaluate(
-        &self,
-        rays: Rays<'_>,
-        worker: &mut Worker<'a>,
-        reduced: &mut [Reduced; LANES],
-        counts: &mut Counts,
-    ) {
+    fn evaluate(&self, rays: Rays<'_>, worker: &mut Worker<'a>, reduced: &mut [Reduced; LANES], counts: &mut Counts) {
         if self.value.run(rays, worker) {
             for (row, values) in worker.rows.iter().zip(worker.output(0).as_chunks::<LANES>().0) {
                 counts.samples += u64::from(row.live.count_ones());

@@ -71,7 +71,10 @@ pub fn refused(shape: &ResolvedShape) -> Option<(String, String)> {
     let before =
         |v: &ParameterValue| matches!(v, ParameterValue::Table(t) if t.interpolation() == TableInterpolation::Pre);
     if shape.parameters.values().any(before) {
-        return Some((format!("a pre-interpolated table in shader {name:?}"), "let it apply after interpolation".into()));
+        return Some((
+            format!("a pre-interpolated table in shader {name:?}"),
+            "let it apply after interpolation".into(),
+        ));
     }
     let wanted = component(shape);
     shape.parameters.iter().find_map(|(name, value)| {

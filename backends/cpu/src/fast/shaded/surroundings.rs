@@ -147,12 +147,7 @@ impl Environment<f32> for Asked<'_, '_> {
 }
 
 /// Components as straight colour and opacity.
-fn colors(
-    fields: &[Field<'_>],
-    (meaning, [low, high]): (Components, [f32; 2]),
-    p: Places<'_>,
-    out: &mut [&mut [f32]],
-) {
+fn colors(fields: &[Field<'_>], (meaning, [low, high]): (Components, [f32; 2]), p: Places<'_>, out: &mut [&mut [f32]]) {
     let n = out.iter().map(|row| row.len()).max().unwrap_or(0);
     let mut numbers: [Vec<f32>; 4] = Default::default();
     for (row, field) in numbers.iter_mut().zip(fields) {
