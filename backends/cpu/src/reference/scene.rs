@@ -150,12 +150,13 @@ impl<'a> Scene<'a> {
             let Some(met) = Met::new(shape, &ray, &self.frame.clip, &sampling, &seen, &mut hits) else { continue };
             if shape.compositing == Compositing::Over { over.push(met) } else { flat.push(Flat::Table(met)) }
         }
+        let others = hits.len();
         let mut sources = self.meet_sources(&ray, &sampling, &seen, tools, &mut hits);
         flat.extend(sources.extract_if(.., |(_, met)| met.is_flat()).map(|(i, met)| Flat::Source(i, met)));
         flat.sort_by_key(Flat::order);
         over.sort_by_key(|m| m.shape.id);
         sources.sort_by_key(|(_, m)| m.shape.id);
-        hits.iter().for_each(|hit| hit.widen(&mut range));
+        hits[others..].iter().for_each(|hit| hit.widen(&mut range));
         let mut doubt = Doubt { whole: open && !flat.is_empty(), width: 0.0 };
         over.iter().for_each(|met| doubt.add(met, range[1]));
         sources.iter().for_each(|(_, met)| doubt.whole |= met.grazed > 0.0);

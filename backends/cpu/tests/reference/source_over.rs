@@ -6,7 +6,7 @@ use volact_core::{
     Appearance, Camera, Compositing, FrameDesc, ParameterType, ScalarType, Shape, Volume, VolumeDesc, VolumeTexture,
     glam::{DAffine3, DVec3},
 };
-use volact_cpu::reference::{Method, ReferenceOptions};
+use volact_cpu::reference::{Classification, Method, ReferenceOptions};
 
 use super::{
     common::{along_z, lut, one_ray, point, table, volume_of},
@@ -273,5 +273,30 @@ fn narrow_peaks_of_tables_are_not_overlooked() {
             assert!(wanted.color.iter().any(|c| c[3] > 0.1));
             alike(&found.color, &wanted.color, 1e-7);
         }
+    }
+}
+
+/// On a lattice `shade_segment` is asked where ends are asked for, and only there.
+#[test]
+fn segments_are_asked_by_their_ends() {
+    let text = "fn shade(s: Sample) -> Medium { return Medium(vec3(0.0, 0.0, 1.0), density()); }
+        fn shade_segment(front: Sample, back: Sample) -> Medium {
+            return Medium(vec3(front.depth, back.depth, front.step), 2.0 * density());
+        }";
+    let all = registry(&[shader("ends", Compositing::Over, &[("density", TO)], text)]);
+    let shape = in_cube(Appearance::new("ends").with("density", 0.5));
+    let ends = ReferenceOptions { classification: Classification::PreIntegrated, ..lattice(0.4) };
+    // Depths begin at 3; segments are counted from the plane through the origin, where the block begins.
+    let (mut truth, mut left) = ([0.0; 4], 1.0);
+    for t in [[3.0, 3.4], [3.4, 3.8], [3.8, 4.0]] {
+        let alpha = -f64::exp_m1(t[0] - t[1]);
+        let color = [t[0], t[1], t[1] - t[0], 1.0];
+        truth = std::array::from_fn(|c| truth[c] + left * alpha * color[c]);
+        left *= 1.0 - alpha;
+    }
+    is(&draw(&all, std::slice::from_ref(&shape), &along_z(0.3, 0.4), &ends), truth, 1e-12);
+    let alpha = -(-0.5f64).exp_m1();
+    for options in [lattice(0.4), evaluated()] {
+        is(&draw(&all, std::slice::from_ref(&shape), &along_z(0.3, 0.4), &options), [0.0, 0.0, alpha, alpha], 1e-10);
     }
 }
