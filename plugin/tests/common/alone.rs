@@ -25,6 +25,8 @@ pub fn cargo(crate_folder: &Path, task: &str) -> String {
     let mut command = Command::new(env!("CARGO"));
     command.current_dir(crate_folder).args([task, "--offline", "--quiet"]);
     command.args(["--config", "profile.dev.opt-level=1", "--config", "profile.dev.package.\"*\".opt-level=1"]);
+    // Its kernels take minutes to optimise, and draw a few small pictures here.
+    command.args(["--config", "profile.dev.package.volact-cpu.opt-level=0"]);
     // Cargo tells its children about the package under test, which is another one here.
     let ours = env::vars_os().map(|(name, _)| name).filter(|name| name.to_string_lossy().starts_with("CARGO_PKG_"));
     ours.for_each(|name| _ = command.env_remove(name));

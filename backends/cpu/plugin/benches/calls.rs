@@ -3,6 +3,7 @@
 //! - A frame of 512² pixels by `cpu`, called directly, linked through the entry and loaded as a library, in turns:
 //!   the ratio of each round, its median and quartiles. Only ratios of the same round are compared, so that a
 //!   machine that is busy now and then does not decide.
+//! - The same with a picture of 8² pixels: little more than the calls themselves, in microseconds.
 //! - Loading the library, each time in a process of its own, since a library stays loaded; and what `volact
 //!   describe` asks for.
 
@@ -76,12 +77,13 @@ fn quartiles(mut values: Vec<f64>) -> [f64; 3] {
     [1, 2, 3].map(|q| values[(values.len() - 1) * q / 4])
 }
 
-fn frames(threads: i64) {
+/// Times of `direct`, `linked` and `loaded` in each round.
+fn rounds(threads: i64, size: usize) -> Vec<[[f64; 2]; 3]> {
     let (shape, registries) = (shape(), [direct(), linked(), loaded()]);
     let options = Options::from([("threads".to_owned(), threads.into())]);
     let mut actions = registries.each_ref().map(|registry| registry.action("cpu", &options).unwrap());
     actions.iter_mut().for_each(|action| action.manage(&shape).unwrap());
-    let desc = FrameDesc::fit(&shape, View::Iso, 512, 512);
+    let desc = FrameDesc::fit(&shape, View::Iso, size, size);
     let mut rounds = Vec::new();
     for round in 0..ROUNDS + 3 {
         let mut times = [[0.0; 2]; 3];
@@ -95,6 +97,11 @@ fn frames(threads: i64) {
             rounds.push(times);
         }
     }
+    rounds
+}
+
+fn frames(threads: i64) {
+    let rounds = rounds(threads, 512);
     for (part, what) in [(0, "draw + end_draw"), (1, "whole frame")] {
         let [_, median, _] = quartiles(rounds.iter().map(|r| r[0][part]).collect());
         println!("{threads} threads, {what}: direct {:.3} ms (median of {ROUNDS})", median * 1e3);
@@ -102,6 +109,15 @@ fn frames(threads: i64) {
             let [low, middle, high] = quartiles(rounds.iter().map(|r| r[who][part] / r[0][part]).collect());
             println!("  {name} / direct: {middle:.4} (quartiles {low:.4} to {high:.4})");
         }
+    }
+}
+
+/// Frames of a few pixels.
+fn calls() {
+    let rounds = rounds(1, 8);
+    for (who, name) in ["direct", "linked", "loaded"].iter().enumerate() {
+        let [low, middle, high] = quartiles(rounds.iter().map(|r| r[who][1] * 1e6).collect());
+        println!("8² pixels, {name}: {middle:.0} µs a frame (quartiles {low:.0} to {high:.0})");
     }
 }
 
@@ -132,5 +148,6 @@ fn main() {
         let [low, middle, high] = quartiles(all.iter().map(|times| times[at] * 1e3).collect());
         println!("{what}: {middle:.2} ms (median of 21 processes, quartiles {low:.2} to {high:.2})");
     }
+    calls();
     [1, 2].into_iter().for_each(frames);
 }
