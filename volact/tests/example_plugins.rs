@@ -43,7 +43,7 @@ fn difference(frame: &Frame, other: &[[f32; 4]]) -> f64 {
 
 /// The stored picture is what `cpu` draws with a fine step, and `reference` agrees.
 fn check(name: &str, registry: &Registry) {
-    let mut scene = Scene::open_with(&example(name).join("scene.ron"), None, registry, &NoProgress).unwrap();
+    let mut scene = Scene::open_with(example(name).join("scene.ron"), None, registry, &NoProgress).unwrap();
     let unit = scene.shapes[0].state().parameters["unit_distance"].as_float().unwrap();
     let fine = Options::from([("sample_distance".to_owned(), (unit / 16.0).into())]);
     let stored = load_picture(&example(name).join("picture.png")).unwrap();
