@@ -3,7 +3,7 @@
 //! Each has a stable code. They go to the frame in which they arose and to a process-wide
 //! handler, which logs them until the application replaces it with [`set_handler`].
 
-use std::{fmt, sync::RwLock};
+use std::{cell::Cell, fmt, sync::RwLock};
 
 /// How much a warning matters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -78,6 +78,9 @@ impl Warning {
 
     /// Hands the warning to the process-wide handler.
     pub fn emit(&self) {
+        if QUIET.get() {
+            return;
+        }
         match HANDLER.read().unwrap_or_else(|e| e.into_inner()).as_ref() {
             Some(handler) => handler(self),
             None => log_warning(self),
@@ -89,6 +92,23 @@ impl fmt::Display for Warning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}: {} [{}]", self.subject, self.message, self.code.as_str())
     }
+}
+
+thread_local! {
+    /// Whether somebody else hands on what this thread emits.
+    static QUIET: Cell<bool> = const { Cell::new(false) };
+}
+
+/// Runs `run`, whose warnings its caller hands on: what this thread emits meanwhile reaches nobody.
+pub(crate) fn quietly<T>(run: impl FnOnce() -> T) -> T {
+    struct Restore(bool);
+    impl Drop for Restore {
+        fn drop(&mut self) {
+            QUIET.set(self.0);
+        }
+    }
+    let _restore = Restore(QUIET.replace(true));
+    run()
 }
 
 /// What receives warnings.

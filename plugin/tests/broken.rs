@@ -143,6 +143,28 @@ fn a_name_claimed_twice_names_both_unless_the_config_says_which() {
     assert_eq!(results[0].as_ref().unwrap().passed_over.len(), 2);
 }
 
+/// A crate `two-words` calls itself `two_words`; the config may write either.
+#[test]
+fn a_name_with_dashes_is_the_same_with_underscores() {
+    let folder = tempfile::tempdir().unwrap();
+    common::c_plugin(
+        folder.path(),
+        "kit.c",
+        "two_words",
+        &["-Dvolact_plugin_kit=volact_plugin_two_words", "-DKIT_NAME=two_words"],
+    );
+    common::c_plugin(folder.path(), "kit.c", "kit", &[]);
+    for chosen in ["two-words", "two_words"] {
+        let mut search = common::search(folder.path(), &["kit", chosen]);
+        search.names = ["zmax", "tint", "octa", "ramp"].map(|name| (name.to_owned(), chosen.to_owned())).into();
+        let mut registry = Registry::with_core();
+        let results = common::load_all(&search, &mut registry);
+        let counts = results.iter().map(|r| r.as_ref().unwrap()).map(|l| (l.registered.len(), l.passed_over.len()));
+        assert_eq!(counts.collect::<Vec<_>>(), [(0, 4), (4, 0)]);
+        assert_eq!(registry.origin(Kind::Action, "zmax"), Some("two_words"));
+    }
+}
+
 fn faulty() -> (tempfile::TempDir, Registry) {
     let folder = tempfile::tempdir().unwrap();
     common::c_plugin(folder.path(), "faulty.c", "faulty", &[]);

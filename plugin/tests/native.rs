@@ -213,6 +213,20 @@ fn loading_twice_gives_one_library() {
     assert_eq!(first.declarations(), second.declarations());
 }
 
+/// The header's codes are checked when it is compiled, the rest by the plugin itself.
+#[test]
+fn codes_and_messages_are_what_c_callers_are_promised() {
+    let folder = tempfile::tempdir().unwrap();
+    common::c_plugin(folder.path(), "codes.c", "codes", &["-pthread"]);
+    let mut registry = Registry::new();
+    common::load(folder.path(), "codes", &mut registry).unwrap();
+    assert_eq!(registry.geometry("codes", &ParameterMap::new()).unwrap().bounds().max, DVec3::ONE);
+    // What is left before an error belongs to it; the other thread's message does not.
+    let fails = ParameterMap::from([("fail".to_owned(), 1i64.into())]);
+    let error = registry.geometry("codes", &fails).unwrap_err().to_string();
+    assert_eq!(error, "plugin \"codes\": of this thread [bad state]");
+}
+
 /// The example of the documentation, as a reader would copy it.
 #[test]
 fn documented_plugin_compiles_and_loads() {

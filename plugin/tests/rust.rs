@@ -148,6 +148,29 @@ fn geometry_is_cut_by_its_maker() {
     }
 }
 
+/// A plugin that panics while it registers what it has; in a process of its own, since that is told by
+/// the environment.
+#[test]
+fn panic_while_registering_is_an_error() {
+    for (mode, wanted) in [("register", "it panicked: in register"), ("register-bomb", "it panicked")] {
+        let mut command = std::process::Command::new(std::env::current_exe().unwrap());
+        command.args(["--exact", "child_whose_plugin_panics", "--ignored"]);
+        let output = command.env("MENAGERIE", mode).env("WANTED", wanted).output().unwrap();
+        assert!(output.status.success(), "{mode}: {}", String::from_utf8_lossy(&output.stdout));
+        assert!(String::from_utf8_lossy(&output.stdout).contains("1 passed"));
+    }
+}
+
+#[test]
+#[ignore = "run by panic_while_registering_is_an_error"]
+fn child_whose_plugin_panics() {
+    let mut registry = Registry::with_core();
+    let before = format!("{registry:?}");
+    let error = common::load(common::rust_plugin(), "menagerie", &mut registry).unwrap_err();
+    assert_eq!((error.code, error.message), (Code::Panicked, std::env::var("WANTED").unwrap()));
+    assert_eq!(format!("{registry:?}"), before);
+}
+
 fn file(folder: &Path, content: &str) -> std::path::PathBuf {
     let path = folder.join("file");
     fs::write(&path, content).unwrap();
@@ -172,7 +195,7 @@ fn loaders_that_fail_or_panic_are_errors() {
     let registry = registry();
     let folder = tempfile::tempdir().unwrap();
     let cause = |error: LoadError| std::error::Error::source(&error).unwrap().to_string();
-    for place in ["open", "read"] {
+    for place in ["open", "read", "warnings"] {
         let error = registry.load(file(folder.path(), &format!("GRID {place}"))).unwrap_err();
         assert_eq!(cause(error), format!("plugin \"menagerie\": it panicked: in {place} [panicked]"));
         let error = registry.load(file(folder.path(), &format!("GRID {place}-bomb"))).unwrap_err();
@@ -180,6 +203,11 @@ fn loaders_that_fail_or_panic_are_errors() {
     }
     assert!(registry.load(file(folder.path(), "GRID close")).is_ok(), "a reader that panics as it goes");
     assert!(registry.load(file(folder.path(), "GRID close-bomb")).is_ok());
+    for mode in ["release", "release-bomb"] {
+        let volume = registry.load(file(folder.path(), &format!("GRID {mode}"))).unwrap();
+        assert_eq!(volume.value([3, 2, 1], 0), 123.0);
+        drop(volume);
+    }
     let error = registry.load(file(folder.path(), "GRID probe")).unwrap_err();
     assert!(matches!(error, LoadError::UnknownFormat { .. }), "{error}");
     let error = cause(registry.load(file(folder.path(), "GRID invalid")).unwrap_err());

@@ -2,8 +2,15 @@
 
 #[path = "../../plugin/tests/common/mod.rs"]
 mod common;
+#[path = "../../plugin/tests/common/library.rs"]
+mod library;
 
-use std::{fs, path::Path};
+use std::{
+    fs,
+    path::Path,
+    sync::{Mutex, OnceLock},
+    time::Duration,
+};
 
 use volact::{
     Attribute, Clip, ClipRegion, ControlPoint, Frame, FrameDesc, Opaque, OpaqueDepth, Plane, SliceStyle, Sliced,
@@ -23,12 +30,32 @@ fn linked() -> Registry {
     let mut registry = Registry::with_core();
     // SAFETY: both entries are made by the macro.
     let loaded = unsafe {
-        [host::link(volact_cpu::volact_plugin, &mut registry), host::link(volact_files::volact_plugin, &mut registry)]
+        [volact_cpu_plugin::volact_plugin, volact_files_plugin::volact_plugin]
+            .map(|entry| host::link(entry, &mut registry))
     };
     let [cpu, files] = loaded.map(Result::unwrap);
-    assert_eq!((cpu.name.as_str(), cpu.registered.len()), ("volact_cpu", 2));
-    assert_eq!((files.name.as_str(), files.registered.len()), ("volact_files", volact_files::loaders().len()));
+    assert_eq!((cpu.name.as_str(), cpu.registered.len()), ("volact_cpu_plugin", 2));
+    assert_eq!((files.name.as_str(), files.registered.len()), ("volact_files_plugin", volact_files::loaders().len()));
     registry
+}
+
+/// The same of libraries that are loaded.
+fn loaded() -> Registry {
+    let mut registry = Registry::with_core();
+    ["volact-cpu-plugin", "volact-files-plugin"]
+        .iter()
+        .for_each(|package| library::load_library(package, &mut registry));
+    registry
+}
+
+/// Both ways behind the boundary, with the shaders that come with Volact as sources.
+fn behind() -> &'static [(&'static str, Registry); 2] {
+    static BOTH: OnceLock<[(&str, Registry); 2]> = OnceLock::new();
+    BOTH.get_or_init(|| {
+        let mut both = [("linked", linked()), ("loaded", loaded())];
+        both.iter_mut().for_each(|(_, registry)| volact::shaders::add_builtin(registry).unwrap());
+        both
+    })
 }
 
 fn draw(registry: &Registry, action: &str, shapes: &[Shape], desc: &FrameDesc) -> Result<Frame, ActionError> {
@@ -45,17 +72,29 @@ fn bits(frame: &Frame) -> (Vec<u32>, Vec<u32>) {
 }
 
 fn same(name: &str, shapes: &[Shape], desc: &FrameDesc) {
-    let (direct, behind) = (Registry::with_builtins(), linked());
+    let direct = Registry::with_builtins();
     for action in ["cpu", "reference"] {
         let wanted = draw(&direct, action, shapes, desc).unwrap();
-        let found = draw(&behind, action, shapes, desc).unwrap();
-        assert!(bits(&wanted) == bits(&found), "{name}, {action}: another picture");
         assert!(wanted.color.iter().any(|c| c[3] > 0.0), "{name}, {action}: an empty picture");
-        assert_eq!((&wanted.method, wanted.background), (&found.method, found.background), "{name}, {action}");
-        assert_eq!(wanted.warnings, found.warnings, "{name}, {action}");
-        let counts = |f: &Frame| (f.statistics.rays, f.statistics.samples, f.statistics.skipped, f.statistics.threads);
-        assert_eq!(counts(&wanted), counts(&found), "{name}, {action}");
+        for (way, registry) in behind() {
+            let found = draw(registry, action, shapes, desc).unwrap();
+            assert_same(&format!("{name}, {action}, {way}"), &wanted, &found);
+        }
     }
+}
+
+/// Everything but times is the same.
+fn assert_same(name: &str, wanted: &Frame, found: &Frame) {
+    assert!(bits(wanted) == bits(found), "{name}: another picture");
+    assert_eq!((&wanted.method, wanted.background), (&found.method, found.background), "{name}");
+    assert_eq!(wanted.warnings, found.warnings, "{name}");
+    let timeless = |frame: &Frame| {
+        let zero = Duration::ZERO;
+        volact::Statistics { total: zero, prepare: zero, render: zero, ..frame.statistics.clone() }
+    };
+    assert_eq!(timeless(wanted), timeless(found), "{name}");
+    let [wanted, found] = [wanted, found].map(|f| [f.statistics.total, f.statistics.render]);
+    assert_eq!(wanted.map(|t| t > Duration::ZERO), found.map(|t| t > Duration::ZERO), "{name}");
 }
 
 fn table() -> LookupTable {
@@ -125,103 +164,185 @@ fn meshes_surfaces_and_slices_are_the_same() {
 
 #[test]
 fn one_action_follows_changes_from_frame_to_frame() {
-    let (direct, behind) = (Registry::with_builtins(), linked());
-    let shape = block();
-    let desc = FrameDesc::fit(&shape, View::Front, 16, 12);
-    let mut actions = [&direct, &behind].map(|registry| registry.action("cpu", &Options::new()).unwrap());
-    let frames = |actions: &mut [Box<dyn RenderAction>; 2]| {
-        let [wanted, found] = actions.each_mut().map(|action| {
-            action.begin_draw(&desc).unwrap();
-            action.draw(&shape).unwrap();
-            action.end_draw().unwrap()
-        });
-        assert!(bits(&wanted) == bits(&found));
-        // Nothing is prepared anew that is not without the boundary.
-        assert_eq!(wanted.statistics.rebuilt, found.statistics.rebuilt);
-        wanted.statistics.rebuilt.len()
-    };
-    actions.iter_mut().for_each(|action| action.manage(&shape).unwrap());
-    assert!(frames(&mut actions) > 0);
-    assert_eq!(frames(&mut actions), 0);
-    shape.set_parameter("lookup_table", LookupTable::window_level(200.0, 100.0, 0.4).unwrap());
-    frames(&mut actions);
-    shape.set_transform(DAffine3::from_rotation_z(0.3));
-    frames(&mut actions);
-    shape.set_geometry(Block::new(DVec3::ONE, DVec3::splat(2.5)).unwrap());
-    frames(&mut actions);
-    shape.state().volume().unwrap().volume().touch();
-    assert!(frames(&mut actions) > 0);
-    shape.set_shader("mip");
-    frames(&mut actions);
+    let direct = Registry::with_builtins();
+    for (way, behind) in behind() {
+        let shape = block();
+        let other = Shape::around(&volume(), Appearance::new("gradient").with("lookup_table", table()));
+        let desc = FrameDesc::fit(&shape, View::Front, 16, 12);
+        let mut actions = [&direct, behind].map(|registry| registry.action("cpu", &Options::new()).unwrap());
+        let frames = |actions: &mut [Box<dyn RenderAction>; 2], shapes: &[&Shape]| {
+            let [wanted, found] = actions.each_mut().map(|action| {
+                action.begin_draw(&desc).unwrap();
+                shapes.iter().for_each(|shape| action.draw(shape).unwrap());
+                action.end_draw().unwrap()
+            });
+            // Nothing is prepared anew that is not without the boundary.
+            assert_same(way, &wanted, &found);
+            wanted.statistics.rebuilt.len()
+        };
+        actions.iter_mut().for_each(|action| action.manage(&shape).unwrap());
+        assert!(frames(&mut actions, &[&shape]) > 0);
+        assert_eq!(frames(&mut actions, &[&shape]), 0);
+        shape.set_parameter("lookup_table", LookupTable::window_level(200.0, 100.0, 0.4).unwrap());
+        frames(&mut actions, &[&shape]);
+        shape.set_transform(DAffine3::from_rotation_z(0.3));
+        frames(&mut actions, &[&shape]);
+        shape.set_geometry(Block::new(DVec3::ONE, DVec3::splat(2.5)).unwrap());
+        frames(&mut actions, &[&shape]);
+        shape.state().volume().unwrap().volume().touch();
+        assert!(frames(&mut actions, &[&shape]) > 0);
+        shape.set_shader("mip");
+        frames(&mut actions, &[&shape]);
+        actions.iter_mut().for_each(|action| action.manage(&other).unwrap());
+        frames(&mut actions, &[&shape, &other]);
+        actions.iter_mut().for_each(|action| action.set_option("skipping", false.into()).unwrap());
+        frames(&mut actions, &[&other, &shape]);
+        actions.iter_mut().for_each(|action| action.unmanage(&shape).unwrap());
+        frames(&mut actions, &[&other]);
+        let caps = actions.each_ref().map(|action| action.caps());
+        assert_eq!(caps[0], caps[1], "{way}");
+    }
+}
+
+/// What an error says; of one that came across the boundary, what the plugin said.
+fn said(error: &ActionError) -> String {
+    match error {
+        ActionError::Plugin(inside) => inside.message.clone(),
+        other => library::words(other),
+    }
 }
 
 #[test]
 fn refusals_have_the_same_words() {
-    let (direct, behind) = (Registry::with_builtins(), linked());
-    let shape = Shape::around(&volume(), Appearance::new("surface"));
+    let direct = Registry::with_builtins();
     let desc = FrameDesc::fit(&block(), View::Front, 4, 4);
-    let [wanted, found] = [&direct, &behind].map(|registry| {
-        let error = draw(registry, "cpu", std::slice::from_ref(&shape), &desc).unwrap_err();
-        let mut words = error.to_string();
-        let mut cause = std::error::Error::source(&error);
-        while let Some(inner) = cause {
-            words = format!("{words}: {inner}");
-            cause = inner.source();
+    let broken = |source: &str| {
+        let mut registry = Registry::with_builtins();
+        let declaration = registry.shaders().get("simple").unwrap().declaration.clone();
+        let declaration = volact::Declaration { name: "broken".into(), ..declaration };
+        let entry = volact::ShaderEntry { declaration, compositing: volact::Compositing::Over, source: None };
+        registry.add_shader_source(entry.clone(), source).unwrap();
+        (entry, source.to_owned(), registry)
+    };
+    let wrong = [
+        Shape::around(&volume(), Appearance::new("surface")),
+        Shape::around(&volume(), Appearance::new("lut")),
+        Shape::around(&volume(), Appearance::new("lutt")),
+        Shape::new(
+            volact::Surface::new(vec![DVec3::ZERO, DVec3::X, DVec3::Y].into(), vec![0u32, 1, 2].into()).unwrap(),
+            Appearance::new("simple").with("volume", &volume()),
+        ),
+    ];
+    for (way, behind) in behind() {
+        for shape in &wrong {
+            for action in ["cpu", "reference"] {
+                let [wanted, found] =
+                    [&direct, behind].map(|registry| draw(registry, action, std::slice::from_ref(shape), &desc));
+                let [wanted, found] = [wanted, found].map(|drawn| drawn.map(|_| ()).map_err(|e| said(&e)));
+                assert_eq!(wanted, found, "{way}, {action}, {:?}", shape.state().shader);
+                assert!(wanted.is_err(), "{action} draws {:?}", shape.state().shader);
+            }
         }
-        words
-    });
-    assert!(found.contains(&wanted), "{found}, wanted {wanted}");
-    for registry in [&direct, &behind] {
-        let options = Options::from([("thread".into(), 2i64.into())]);
-        let words = registry.action("cpu", &options).err().unwrap().to_string();
-        assert!(words.contains("did you mean \"threads\"?"), "{words}");
+        for options in [("thread", 2i64), ("threads", -1)] {
+            let options = Options::from([(options.0.into(), options.1.into())]);
+            let words = |registry: &Registry| said(&registry.action("cpu", &options).err().unwrap());
+            assert_eq!(words(&direct), words(behind), "{way}");
+        }
+        for change in [("thread", 2i64), ("threads", -1)] {
+            let words = |registry: &Registry| {
+                let mut action = registry.action("cpu", &Options::new()).unwrap();
+                said(&action.set_option(change.0, change.1.into()).unwrap_err())
+            };
+            assert_eq!(words(&direct), words(behind), "{way}");
+        }
+        assert_eq!(format!("{:?}", direct.declarations()), format!("{:?}", behind.declarations()), "{way}");
+        // A shader's mistake is shown at the author's file, line and caret.
+        let (entry, source, with_broken) = broken("fn shade(s: Sample) -> Medium {\n    return nobody(s);\n}\n");
+        let mut behind = behind.clone();
+        behind.add_shader_source(entry, source).unwrap();
+        let shape = Shape::around(&volume(), Appearance::new("broken"));
+        let words =
+            [&with_broken, &behind].map(|r| said(&draw(r, "cpu", std::slice::from_ref(&shape), &desc).unwrap_err()));
+        assert!(words[0] == words[1] && words[0].contains("broken.wgsl:2"), "{way}: {words:?}");
     }
-    let declarations = |registry: &Registry| format!("{:?}", registry.declarations());
-    assert_eq!(declarations(&direct), declarations(&behind));
+}
+
+/// What long preparations say of how far they are, and what the application's handler hears.
+#[test]
+fn progress_and_warnings_are_heard() {
+    static HEARD: Mutex<Vec<(String, u64, u64)>> = Mutex::new(Vec::new());
+    static WARNED: Mutex<Vec<String>> = Mutex::new(Vec::new());
+    let hear = |warning: &volact::Warning| {
+        if warning.subject == "heard" {
+            WARNED.lock().unwrap().push(warning.to_string());
+        }
+    };
+    volact::core::warning::set_handler(Some(Box::new(hear)));
+    let ball = [
+        ("center".to_owned(), DVec3::new(3.0, 3.0, 4.0).into()),
+        ("radius".to_owned(), 2.5.into()),
+        ("segments".to_owned(), 48i64.into()),
+    ];
+    let ball = Registry::with_builtins().geometry("sphere", &ball.into()).unwrap();
+    let look = Appearance::new("lut").with("lookup_table", table()).with("volume", &volume()).with("shininess", 3.0);
+    let shape = Shape::build("heard", ball, look, DAffine3::IDENTITY);
+    let desc = FrameDesc::fit(&shape, View::Front, 8, 8);
+    let mut all = Vec::new();
+    for mut registry in [Registry::with_builtins(), behind()[0].1.clone(), behind()[1].1.clone()] {
+        HEARD.lock().unwrap().clear();
+        WARNED.lock().unwrap().clear();
+        registry.set_progress(volact::core::action::Watch::new(|what, done, total| {
+            HEARD.lock().unwrap().push((what.to_owned(), done, total));
+        }));
+        let mut action = registry.action("cpu", &Options::new()).unwrap();
+        action.manage(&shape).unwrap();
+        for _ in 0..2 {
+            action.begin_draw(&desc).unwrap();
+            action.draw(&shape).unwrap();
+            action.end_draw().unwrap();
+        }
+        all.push((HEARD.lock().unwrap().clone(), WARNED.lock().unwrap().clone()));
+    }
+    volact::core::warning::set_handler(None);
+    assert!(!all[0].0.is_empty() && !all[0].1.is_empty(), "{all:?}");
+    assert!(all[0] == all[1] && all[0] == all[2], "{all:?}");
 }
 
 #[test]
 fn example_files_load_the_same() {
-    let (direct, behind) = (Registry::with_builtins(), linked());
+    let direct = Registry::with_builtins();
     let examples = common::root().join("examples");
-    for name in ["head/head.nrrd", "part/part.nrrd", "signal/signal.nrrd"] {
-        let [wanted, found] = [&direct, &behind].map(|registry| registry.load(examples.join(name)).unwrap());
-        assert_eq!(wanted.desc(), found.desc(), "{name}");
-        assert!(wanted.data().bytes() == found.data().bytes(), "{name}");
+    for (way, behind) in behind() {
+        for name in ["head/head.nrrd", "part/part.nrrd", "signal/signal.nrrd"] {
+            let [wanted, found] = [&direct, behind].map(|registry| registry.load(examples.join(name)).unwrap());
+            assert_eq!(wanted.desc(), found.desc(), "{name}, {way}");
+            assert!(wanted.data().bytes() == found.data().bytes(), "{name}, {way}");
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("bad.nrrd");
+        fs::write(&path, "NRRD0004\ntype: nonsense\n\n").unwrap();
+        let [wanted, found] = [&direct, behind].map(|registry| registry.load(&path).unwrap_err());
+        let cause = std::error::Error::source(&found).unwrap().to_string();
+        assert!(cause.contains(&wanted.to_string()), "{cause}, wanted {wanted}");
     }
-    let fixtures = common::root().join("plugins/files/tests/fixtures");
-    for name in ["mixed_raw_none_le_h64_i32.vtu", "curved_raw_none_le_h64_i32.vts", "surface_le.ply", "blanked.vts"] {
-        let [wanted, found] = [&direct, &behind].map(|registry| registry.load_mesh(fixtures.join(name)).unwrap());
-        assert_eq!((&wanted.name, wanted.geometry.name()), (&found.name, found.geometry.name()), "{name}");
-        assert_eq!(wanted.geometry.bounds(), found.geometry.bounds(), "{name}");
-        assert_eq!(wanted.geometry.tessellate().ok(), found.geometry.tessellate().ok(), "{name}");
-        let numbers = |mesh: &volact::MeshData| {
-            mesh.attributes
-                .iter()
-                .map(|a| (a.name.clone(), a.scalar, a.components, a.data.bytes().to_vec()))
-                .collect::<Vec<_>>()
-        };
-        assert_eq!(numbers(&wanted), numbers(&found), "{name}");
-    }
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("bad.nrrd");
-    fs::write(&path, "NRRD0004\ntype: nonsense\n\n").unwrap();
-    let [wanted, found] = [&direct, &behind].map(|registry| registry.load(&path).unwrap_err());
-    let cause = std::error::Error::source(&found).unwrap().to_string();
-    assert!(cause.contains(&wanted.to_string()), "{cause}, wanted {wanted}");
 }
 
 #[test]
-fn a_scene_is_the_same_through_loaders_and_action() {
-    let path = common::root().join("examples/part/scene.ron");
-    let draw_scene = |registry: &Registry| {
-        let mut file = SceneFile::open(&path, registry).unwrap();
-        file.image.size = Some([48, 36]);
-        let folders = Folders { base: path.parent().unwrap(), data: None };
-        let scene = file.build(registry, folders, &NoProgress).unwrap();
-        bits(&draw(registry, "cpu", &scene.shapes, &scene.frame).unwrap())
-    };
-    assert!(draw_scene(&Registry::with_builtins()) == draw_scene(&linked()));
+fn scenes_are_the_same_through_loaders_and_action() {
+    for name in ["part", "spring", "bent", "carved"] {
+        let path = common::root().join("examples").join(name).join("scene.ron");
+        let draw_scene = |registry: &Registry| {
+            let mut file = SceneFile::open(&path, registry).unwrap();
+            file.image.size = Some([48, 36]);
+            let folders = Folders { base: path.parent().unwrap(), data: None };
+            let scene = file.build(registry, folders, &NoProgress).unwrap();
+            draw(registry, "cpu", &scene.shapes, &scene.frame).unwrap()
+        };
+        let wanted = draw_scene(&Registry::with_builtins());
+        behind()
+            .iter()
+            .for_each(|(way, registry)| assert_same(&format!("{name}, {way}"), &wanted, &draw_scene(registry)));
+    }
 }
 
 fn tiny(folder: &Path) -> Frame {

@@ -3,8 +3,7 @@
 //! - [`mod@reference`]: f64, cell by cell, with an enclosure for each pixel. Slow, plain and right.
 //! - [`fast`]: the action `cpu`: f32, all cores, the widest vector unit found.
 //!
-//! The crate is a plugin, too: [`volact_plugin()`] is its entry for hosts that link it, and
-//! `cargo rustc -p volact-cpu --release --crate-type cdylib` makes a library to load.
+//! `volact-cpu-plugin`, beside this crate, is both as a plugin: a library to load, and an entry to link.
 
 pub mod fast;
 pub mod reference;
@@ -19,5 +18,3 @@ pub fn register(registry: &mut Registry) -> Result<(), RegisterError> {
     reference::register(registry)?;
     fast::register(registry)
 }
-
-volact_plugin::export!(register);

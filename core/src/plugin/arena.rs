@@ -34,10 +34,10 @@ impl Arena {
         if values.is_empty() {
             return (std::ptr::null(), 0);
         }
-        let kept = Kept(values.into_boxed_slice());
-        let found = (kept.0.as_ptr(), kept.0.len() as u64);
-        self.0.push(Box::new(kept));
-        found
+        // A raw pointer from the start: a box says that nobody else points to what it holds.
+        let kept = Box::into_raw(values.into_boxed_slice());
+        self.0.push(Box::new(Kept(kept)));
+        (kept.cast::<T>().cast_const(), kept.len() as u64)
     }
 
     /// Keeps one value.
@@ -62,7 +62,15 @@ impl Arena {
     }
 }
 
-struct Kept<T>(Box<[T]>);
+/// What a list was made of; only read until it is dropped.
+struct Kept<T>(*mut [T]);
+
+impl<T> Drop for Kept<T> {
+    fn drop(&mut self) {
+        // SAFETY: the pointer is that of a box, and is given up only here.
+        drop(unsafe { Box::from_raw(self.0) });
+    }
+}
 
 // SAFETY: kept values are plain data, only read through the views, and views say for how long.
 unsafe impl<T> Send for Kept<T> {}

@@ -21,6 +21,8 @@ mod geometry;
 pub mod guest;
 pub mod host;
 mod picture;
+#[cfg(test)]
+mod round_trip;
 mod services;
 mod shape;
 mod status;

@@ -14,8 +14,7 @@
 //! - Memory is taken for what a file can hold, never on the word of a header.
 //! - World space of medical formats is LPS.
 //!
-//! The crate is a plugin, too: [`volact_plugin()`] is its entry for hosts that link it, and
-//! `cargo rustc -p volact-files --release --crate-type cdylib` makes a library to load.
+//! `volact-files-plugin`, beside this crate, is all of it as a plugin: a library to load, and an entry to link.
 
 mod decode;
 mod dicom;
@@ -144,5 +143,3 @@ fn resolve(loader: &str, options: &LoadOptions) -> Result<(Format, LoadOptions),
     })?;
     Ok((format, options))
 }
-
-volact_plugin::export!(register);

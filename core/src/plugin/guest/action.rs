@@ -21,6 +21,7 @@ use crate::{
     },
     registry::ActionFactory,
     shader::ShaderCatalog,
+    warning::quietly,
 };
 
 /// The table of an action.
@@ -258,7 +259,8 @@ unsafe extern "C" fn end_draw(action: *mut c_void, sink: *const FrameSink) -> i3
     answer(|| {
         // SAFETY: the host gives an action of `create` and a sink.
         let (instance, sink) = unsafe { (instance(action)?, given(sink, "sink")?) };
-        let frame = instance.inner.end_draw().map_err(fault)?;
+        // The frame has its warnings, and the host hands them to the application's handler.
+        let frame = quietly(|| instance.inner.end_draw()).map_err(fault)?;
         // SAFETY: as above.
         unsafe { show(frame, sink) }
     })

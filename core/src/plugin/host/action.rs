@@ -1,11 +1,11 @@
 //! A plugin's render action as core's own trait.
 
-use std::{ffi::c_void, sync::Arc};
+use std::{collections::BTreeSet, ffi::c_void, sync::Arc};
 
 use super::{call, needed};
 use crate::{
-    ActionError, Caps, Context, Declaration, Frame, FrameDesc, Options, ParameterValue, RenderAction, ShaderText,
-    Shape,
+    ActionError, Caps, Context, Declaration, Frame, FrameDesc, Options, ParameterValue, RenderAction, Severity,
+    ShaderText, Shape,
     action::Watch,
     lifecycle::Lifecycle,
     parameter::ParameterProblem,
@@ -84,6 +84,8 @@ struct PluginAction {
     handle: Handle,
     /// What the frame that is open points to.
     frame: Option<Arena>,
+    /// Warnings that the process-wide handler has had.
+    said: BTreeSet<String>,
     /// What the context points to, for as long as the action lives.
     _kept: Arena,
 }
@@ -152,6 +154,7 @@ impl PluginAction {
             lifecycle: Lifecycle::new(context.clone()),
             handle: Handle(handle),
             frame: None,
+            said: BTreeSet::new(),
             _kept: kept,
         })
     }
@@ -269,6 +272,11 @@ impl RenderAction for PluginAction {
         warnings.retain(|w| !frame.warnings.contains(w));
         warnings.append(&mut frame.warnings);
         frame.warnings = warnings;
+        for warning in frame.warnings.iter().filter(|w| w.severity == Severity::Warning) {
+            if self.said.insert(warning.to_string()) {
+                warning.emit();
+            }
+        }
         Ok(frame)
     }
 

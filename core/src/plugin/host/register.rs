@@ -65,7 +65,7 @@ pub unsafe fn load(search: &Search, registry: &mut Registry) -> Vec<Outcome> {
     }
     // A name that the config gives to a plugin must be one that it has.
     for (name, plugin) in &search.names {
-        let Some(outcome) = all.iter().find(|o| o.name == *plugin) else {
+        let Some(outcome) = all.iter().find(|o| plain(&o.name) == plain(plugin)) else {
             log::warn!("the config gives {name:?} to {plugin:?}, which is none of its plugins");
             continue;
         };
@@ -77,6 +77,11 @@ pub unsafe fn load(search: &Search, registry: &mut Registry) -> Vec<Outcome> {
     all
 }
 
+/// A plugin's name as its library and its crate have it.
+fn plain(name: &str) -> String {
+    name.replace('-', "_")
+}
+
 /// # Safety
 /// As [`load`].
 unsafe fn load_one(search: &Search, wanted: &Wanted, registry: &mut Registry) -> Result<Loaded, PluginError> {
@@ -86,7 +91,6 @@ unsafe fn load_one(search: &Search, wanted: &Wanted, registry: &mut Registry) ->
         let entry = unsafe { entry_of(&path, wanted) }?;
         // SAFETY: as promised by the caller.
         let offer = unsafe { offer_of(entry) }?;
-        let plain = |name: &str| name.replace('-', "_");
         if plain(&offer.name) != plain(&wanted.name) {
             let message = format!("calls itself {:?}, wanted the name of its library", offer.name);
             return Err(Fault::new(Code::BadName, message));
@@ -133,7 +137,7 @@ fn take(
         let (kind, name) = (declaration.kind, declaration.name.clone());
         let about = Registration { kind, name: name.clone(), version: declaration.version.clone() };
         let chosen = names.get(&name);
-        if chosen.is_some_and(|chosen| *chosen != plugin) {
+        if chosen.is_some_and(|chosen| plain(chosen) != plain(&plugin)) {
             passed_over.push(about);
             continue;
         }

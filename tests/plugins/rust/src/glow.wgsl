@@ -1,2 +1,3 @@
-// glow: the data as they are.
-fn shade(s: Sample) -> Medium { return Medium(vec3f(volume(s.position)), 1.0); }
+// glow: the highest value of the data as it is.
+fn value(s: Sample) -> f32 { return volume(s.position); }
+fn shade(s: Sample) -> Medium { return Medium(vec3f(s.value), 1.0); }

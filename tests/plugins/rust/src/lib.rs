@@ -94,13 +94,14 @@ fn make_pyramid(parameters: &ParameterMap) -> Result<Arc<dyn Geometry>, Geometry
 }
 
 fn register(registry: &mut Registry) -> Result<(), RegisterError> {
+    panic_at(&std::env::var("MENAGERIE").unwrap_or_default(), "register");
     let version = env!("CARGO_PKG_VERSION");
     let height = ParameterDecl::new("height", ParameterType::Float, "its height").default(1.0).bounds(-1e9, 1e9);
     let pyramid = Declaration::new(Kind::Geometry, "pyramid", version, "a pyramid").with(height).with(mode());
     registry.add_geometry(pyramid, Arc::new(make_pyramid))?;
     let volume = ParameterDecl::new("volume", ParameterType::Volume, "the data").required();
     let declaration = Declaration::new(Kind::Shader, "glow", version, "the data, glowing").with(volume);
-    let entry = ShaderEntry { declaration, compositing: Compositing::Maximum };
+    let entry = ShaderEntry { declaration, compositing: Compositing::Maximum, source: None };
     registry.add_shader_source(entry, include_str!("glow.wgsl"))?;
     action::register(registry)?;
     loader::register(registry)

@@ -3,7 +3,7 @@
 use std::{fs, path::Path, sync::Arc};
 
 use volact_plugin::{
-    Attribute, Buffer, CellType, CellTypes, Declaration, LoadError, LoadOptions, Loader, Mesh, MeshData, Points,
+    Attribute, Buffer, Bulk, CellType, CellTypes, Declaration, LoadError, LoadOptions, Loader, Mesh, MeshData, Points,
     Progress, Region, Registry, ScalarType, VolumeDesc, VolumeReader, Warning, WarningCode,
     glam::DVec3,
     loader::{Confidence, Content, Probe},
@@ -27,12 +27,28 @@ struct Reader {
     warnings: Vec<Warning>,
 }
 
+/// Voxels that can panic when nobody uses them any more.
+struct Voxels(Buffer, String);
+
+impl Bulk for Voxels {
+    fn bytes(&self) -> &[u8] {
+        self.0.bytes()
+    }
+}
+
+impl Drop for Voxels {
+    fn drop(&mut self) {
+        panic_at(&self.1, "release");
+    }
+}
+
 impl VolumeReader for Reader {
     fn desc(&self) -> &VolumeDesc {
         &self.desc
     }
 
     fn warnings(&self) -> &[Warning] {
+        panic_at(&self.mode, "warnings");
         &self.warnings
     }
 
@@ -47,7 +63,7 @@ impl VolumeReader for Reader {
                 values.extend((region.min[0]..=region.max[0]).map(|x| (x + 10 * y + 100 * z) as u16));
             }
         }
-        Ok(values.into())
+        Ok(Buffer::new(Voxels(values.into(), self.mode.clone())))
     }
 }
 
