@@ -1,0 +1,203 @@
+//! What a picture depends on, and what that looked like at one moment.
+
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    fs,
+    hash::{DefaultHasher, Hash, Hasher},
+    io::Read as _,
+    path::{Path, PathBuf},
+    time::SystemTime,
+};
+
+/// A file is compared by content up to this many bytes.
+const SMALL: u64 = 1 << 20;
+/// A data file up to this many bytes may be a header that names others.
+const HEADER: u64 = 1 << 18;
+
+/// Something that the picture depends on.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Root {
+    /// A file.
+    File(PathBuf),
+    /// All shaders of a folder.
+    Shaders(PathBuf),
+    /// A file or folder that a loader reads, with what it may read beside it.
+    Data(PathBuf),
+}
+
+/// What a file looks like.
+#[derive(Clone, Debug, PartialEq, Eq)]
+enum Stamp {
+    Missing,
+    /// Of a small file.
+    Content(u64),
+    /// Of a large one, or a folder.
+    Place {
+        bytes: u64,
+        modified: Option<SystemTime>,
+        number: u64,
+    },
+}
+
+impl Stamp {
+    fn of(path: &Path) -> Self {
+        let Ok(data) = fs::metadata(path) else { return Self::Missing };
+        if data.is_file()
+            && data.len() <= SMALL
+            && let Some(bytes) = read(path, SMALL)
+        {
+            let mut hasher = DefaultHasher::new();
+            bytes.hash(&mut hasher);
+            return Self::Content(hasher.finish());
+        }
+        if data.is_dir() {
+            return Self::Place { bytes: 0, modified: None, number: 0 };
+        }
+        Self::Place { bytes: data.len(), modified: data.modified().ok(), number: number(&data) }
+    }
+}
+
+/// What tells a file from another of the same length and time.
+#[cfg(unix)]
+fn number(data: &fs::Metadata) -> u64 {
+    std::os::unix::fs::MetadataExt::ino(data)
+}
+
+#[cfg(not(unix))]
+fn number(_: &fs::Metadata) -> u64 {
+    0
+}
+
+fn read(path: &Path, most: u64) -> Option<Vec<u8>> {
+    let mut bytes = Vec::new();
+    fs::File::open(path).ok()?.take(most).read_to_end(&mut bytes).ok()?;
+    Some(bytes)
+}
+
+/// All files of some roots at one moment.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Snapshot(BTreeMap<Root, BTreeMap<PathBuf, Stamp>>);
+
+impl Snapshot {
+    /// Looks at all files but the picture.
+    pub fn take(roots: &BTreeSet<Root>, output: &Path) -> Self {
+        let look = |root: &Root| {
+            let stamps = root.files(output).into_iter().map(|path| (Stamp::of(&path), path));
+            (root.clone(), stamps.map(|(stamp, path)| (path, stamp)).collect())
+        };
+        Self(roots.iter().map(look).collect())
+    }
+
+    /// The files that are not as they were.
+    pub fn changes(&self, before: &Self) -> Vec<PathBuf> {
+        let (now, before) = (self.flat(), before.flat());
+        let gone = before.keys().filter(|path| !now.contains_key(*path));
+        let other = now.iter().filter(|(path, stamp)| before.get(*path) != Some(stamp)).map(|(path, _)| path);
+        other.chain(gone).map(|path| path.to_path_buf()).collect()
+    }
+
+    /// Whether data are as they were, with all that belongs to them.
+    pub fn same(&self, before: &Self, data: &Path) -> bool {
+        let root = Root::Data(data.into());
+        self.0.get(&root).is_some_and(|files| before.0.get(&root) == Some(files))
+    }
+
+    /// Whether a file that was there is missing.
+    pub fn lost(&self, before: &Self) -> bool {
+        let now = self.flat();
+        let missing = |path: &Path| now.get(path).is_none_or(|stamp| **stamp == Stamp::Missing);
+        before.flat().into_iter().any(|(path, stamp)| *stamp != Stamp::Missing && missing(path))
+    }
+
+    /// Whether a picture of that name would be drawn from itself.
+    pub fn holds(&self, output: &Path) -> bool {
+        let place = |path: &Path| path.canonicalize().ok();
+        let named = |root: &Root| matches!(root, Root::File(path) | Root::Data(path) if place(path) == place(output));
+        output.exists() && self.0.keys().any(named)
+    }
+
+    /// The folders in which all files are.
+    pub fn folders(&self) -> BTreeSet<PathBuf> {
+        let parent = |path: &Path| match path.parent() {
+            Some(parent) if parent.as_os_str().is_empty() => PathBuf::from("."),
+            Some(parent) => parent.into(),
+            None => path.into(),
+        };
+        let mut folders: BTreeSet<_> = self.flat().into_keys().map(parent).collect();
+        folders.extend(self.0.keys().filter_map(|root| match root {
+            Root::Shaders(folder) => Some(folder.clone()),
+            Root::Data(folder) if folder.is_dir() => Some(folder.clone()),
+            _ => None,
+        }));
+        folders.into_iter().filter(|folder| folder.is_dir()).collect()
+    }
+
+    /// How many files and folders there are, in words.
+    pub fn summary(&self) -> String {
+        let count = |n: usize, one: &str| if n == 1 { format!("1 {one}") } else { format!("{n} {one}s") };
+        format!("{} in {}", count(self.flat().len(), "file"), count(self.folders().len(), "folder"))
+    }
+
+    fn flat(&self) -> BTreeMap<&Path, &Stamp> {
+        self.0.values().flatten().map(|(path, stamp)| (path.as_path(), stamp)).collect()
+    }
+}
+
+impl Root {
+    /// The files that are there, and those that should be.
+    fn files(&self, output: &Path) -> Vec<PathBuf> {
+        match self {
+            Self::File(path) => vec![path.clone()],
+            Self::Shaders(folder) => {
+                let sources = entries(folder).into_iter().filter(|path| path.extension().is_some_and(|e| e == "wgsl"));
+                sources.flat_map(|path| [path.with_extension("ron"), path]).collect()
+            }
+            Self::Data(path) => {
+                let output = output.canonicalize().ok();
+                let mut files = vec![path.clone()];
+                files.extend(beside(path).into_iter().filter(|p| output.is_none() || p.canonicalize().ok() != output));
+                files
+            }
+        }
+    }
+}
+
+/// What a loader may read beside a file: what the file names if it is a header, what shares its
+/// name, and all that a folder or a pattern stands for.
+fn beside(path: &Path) -> Vec<PathBuf> {
+    if path.is_dir() {
+        return entries(path);
+    }
+    let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    if let Some((start, _)) = name.split_once('%').filter(|_| !path.exists()) {
+        return entries(folder).into_iter().filter(|p| file_name(p).starts_with(start)).collect();
+    }
+    let header = fs::metadata(path).is_ok_and(|data| data.len() <= HEADER).then(|| read(path, HEADER)).flatten();
+    let header = header.map(|bytes| String::from_utf8_lossy(&bytes).into_owned()).unwrap_or_default();
+    let stem = |name: &str| name.split('.').next().unwrap_or_default().to_owned();
+    let picture = |name: &str| [".png", ".exr", ".npy"].iter().any(|end| name.ends_with(end));
+    let belongs = |other: &str| {
+        other != name && (header.contains(other) || stem(other) == stem(&name) && !picture(other) && !written(other))
+    };
+    entries(folder).into_iter().filter(|p| belongs(&file_name(p))).collect()
+}
+
+/// Whether a file is a scene or shader, which are watched for themselves.
+fn written(name: &str) -> bool {
+    (name.ends_with(".ron") && !name.ends_with(".raw.ron")) || name.ends_with(".wgsl")
+}
+
+fn file_name(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// The files of a folder, but for hidden ones and what editors keep aside.
+fn entries(folder: &Path) -> Vec<PathBuf> {
+    let aside = |name: &str| name.starts_with('.') || name.ends_with('~');
+    let Ok(listed) = fs::read_dir(folder) else { return Vec::new() };
+    let mut paths: Vec<_> = listed.flatten().map(|entry| entry.path()).collect();
+    paths.retain(|path| !aside(&file_name(path)) && path.is_file());
+    paths.sort();
+    paths
+}
