@@ -107,7 +107,8 @@ fn shaders_of_ones_own_have_pages_and_pictures() {
          \"volume\": Volume(data: \"v\")})], image: (size: (20, 10)))",
     )
     .unwrap();
-    let voxels = [b"NRRD0004\ntype: uint8\ndimension: 3\nsizes: 2 2 2\nencoding: raw\n\n".to_vec(), vec![9; 8]].concat();
+    let voxels =
+        [b"NRRD0004\ntype: uint8\ndimension: 3\nsizes: 2 2 2\nencoding: raw\n\n".to_vec(), vec![9; 8]].concat();
     fs::write(place("v.nrrd"), voxels).unwrap();
     let run = |config: &str| {
         let mut command = Command::new(env!("CARGO_BIN_EXE_volact"));

@@ -163,7 +163,7 @@ impl Root {
 }
 
 /// What a loader may read beside a file: what the file names if it is a header, what shares its
-/// name, and all that a folder or a pattern stands for.
+/// name, all slices of a series, and all that a folder or a pattern stands for.
 fn beside(path: &Path) -> Vec<PathBuf> {
     if path.is_dir() {
         return entries(path);
@@ -174,11 +174,15 @@ fn beside(path: &Path) -> Vec<PathBuf> {
         return entries(folder).into_iter().filter(|p| file_name(p).starts_with(start)).collect();
     }
     let header = fs::metadata(path).is_ok_and(|data| data.len() <= HEADER).then(|| read(path, HEADER)).flatten();
-    let header = header.map(|bytes| String::from_utf8_lossy(&bytes).into_owned()).unwrap_or_default();
+    let header = header.and_then(|bytes| String::from_utf8(bytes).ok()).unwrap_or_default();
     let stem = |name: &str| name.split('.').next().unwrap_or_default().to_owned();
+    let ending = |name: &str| Path::new(name).extension().map(|e| e.to_ascii_lowercase());
+    let numbered = stem(&name).ends_with(|c: char| c.is_ascii_digit());
     let picture = |name: &str| [".png", ".exr", ".npy"].iter().any(|end| name.ends_with(end));
     let belongs = |other: &str| {
-        other != name && (header.contains(other) || stem(other) == stem(&name) && !picture(other) && !written(other))
+        let series = numbered && ending(other) == ending(&name);
+        let alike = stem(other) == stem(&name) || header.contains('%');
+        other != name && (header.contains(other) || series || alike && !picture(other) && !written(other))
     };
     entries(folder).into_iter().filter(|p| belongs(&file_name(p))).collect()
 }
@@ -200,4 +204,76 @@ fn entries(folder: &Path) -> Vec<PathBuf> {
     paths.retain(|path| !aside(&file_name(path)) && path.is_file());
     paths.sort();
     paths
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn folder(files: &[(&str, &str)]) -> tempfile::TempDir {
+        let folder = tempfile::tempdir().unwrap();
+        files.iter().for_each(|(name, text)| fs::write(folder.path().join(name), text).unwrap());
+        folder
+    }
+
+    fn names(folder: &Path, data: &str, output: &str) -> Vec<String> {
+        let files = Root::Data(folder.join(data)).files(&folder.join(output));
+        files.iter().map(|path| file_name(path)).collect()
+    }
+
+    #[test]
+    fn what_belongs_to_data_is_found_and_the_picture_is_not() {
+        let folder = folder(&[
+            ("a.nhdr", "NRRD0004\ndata file: voxels.raw\n"),
+            ("voxels.raw", ""),
+            ("a.raw.gz", ""),
+            ("a.png", ""),
+            ("a.ron", ""),
+            ("b.raw.ron", "(file: \"s%d.u8\", numbers: (1, 2))"),
+            ("s1.u8", ""),
+            ("s2.u8", ""),
+            ("c01.dcm", "\u{1}"),
+            ("c02.dcm", "\u{1}"),
+            (".c03.dcm", "\u{1}"),
+            ("c04.dcm~", "\u{1}"),
+        ]);
+        let path = folder.path();
+        assert_eq!(names(path, "a.nhdr", "a.png"), ["a.nhdr", "a.raw.gz", "voxels.raw"]);
+        assert_eq!(names(path, "c01.dcm", "x.png"), ["c01.dcm", "c02.dcm"]);
+        assert_eq!(names(path, "c%02d.dcm", "x.png"), ["c%02d.dcm", "c01.dcm", "c02.dcm"]);
+        let of_pattern = names(path, "b.raw.ron", "x.png");
+        assert!(of_pattern.contains(&"s1.u8".into()) && of_pattern.contains(&"s2.u8".into()), "{of_pattern:?}");
+        assert!(!of_pattern.contains(&"a.png".into()) && !of_pattern.contains(&"a.ron".into()), "{of_pattern:?}");
+        assert!(!names(path, ".", "a.png").contains(&"a.png".into()), "a series without its picture");
+    }
+
+    #[test]
+    fn what_changed_is_named_and_what_is_alike_is_not() {
+        let folder = folder(&[("a.nrrd", "1"), ("t.f32", "1"), ("x.wgsl", "1"), ("x.ron", "1"), ("scene.ron", "1")]);
+        let place = |name: &str| folder.path().join(name);
+        let roots = BTreeSet::from([
+            Root::Data(place("a.nrrd")),
+            Root::File(place("t.f32")),
+            Root::File(place("scene.ron")),
+            Root::Shaders(folder.path().into()),
+        ]);
+        let take = || Snapshot::take(&roots, Path::new("out.png"));
+        let before = take();
+        assert_eq!(before.folders(), BTreeSet::from([folder.path().to_owned()]));
+        fs::write(place("t.f32"), "1").unwrap();
+        fs::write(place("notes.txt"), "1").unwrap();
+        assert_eq!(take(), before, "a file that is saved as it was");
+        fs::write(place("t.f32"), "2").unwrap();
+        fs::write(place("y.wgsl"), "1").unwrap();
+        let now = take();
+        let mut changed = now.changes(&before);
+        changed.sort();
+        assert_eq!(changed, ["t.f32", "y.ron", "y.wgsl"].map(place));
+        assert!(now.same(&before, &place("a.nrrd")) && !now.lost(&before));
+        fs::remove_file(place("a.nrrd")).unwrap();
+        let gone = take();
+        assert!(gone.lost(&now) && !gone.same(&now, &place("a.nrrd")) && !now.lost(&gone));
+        fs::write(place("out.png"), "").unwrap();
+        assert!(!now.holds(&place("out.png")) && now.holds(&place("t.f32")), "a picture is no source of itself");
+    }
 }
