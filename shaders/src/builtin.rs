@@ -65,6 +65,13 @@ pub enum Native {
     Attribute,
 }
 
+impl Native {
+    /// The name of the built-in shader.
+    pub fn name(self) -> &'static str {
+        NATIVE.iter().find(|(native, _)| *native == self).map_or("", |(_, name)| name)
+    }
+}
+
 const NATIVE: [(Native, &str); 7] = [
     (Native::Simple, "simple"),
     (Native::Lut, "lut"),

@@ -275,7 +275,7 @@ fn lit(color: [f64; 3], gradient: DVec3, at: At, light: DVec3, phong: bool) -> [
         true => (2.0 * cosine * normal - light).dot(-at.direction),
     };
     let highlight = 0.2 * mirrored.max(0.0).powf(10.0);
-    color.map(|c| if cosine > 0.0 { c * (0.2 + 0.7 * cosine) + highlight } else { c * 0.2 })
+    color.map(|c| if cosine > 0.0 { (c * (0.2 + 0.7 * cosine) + highlight).min(1.0) } else { c * 0.2 })
 }
 
 #[test]

@@ -1,6 +1,6 @@
 // gradient: a table, lit by the gradient.
 //
-//     colour = c·(ambient + diffuse·n·l) + specular·m^shininess
+//     colour = min(1, c·(ambient + diffuse·n·l) + specular·m^shininess)
 //
 // with the normal n along the gradient of the value (central differences over one voxel either
 // way, in world units), l the direction to the light and v that to the eye, all in world space;
@@ -33,7 +33,7 @@ fn lit(color: vec3<f32>, s: Sample) -> vec3<f32> {
     } else {
         mirrored = max(dot(normal, normalize(l + s.view)), 0.0);
     }
-    return color * (ambient() + diffuse() * cosine) + specular() * pow(mirrored, shininess());
+    return min(color * (ambient() + diffuse() * cosine) + specular() * pow(mirrored, shininess()), vec3<f32>(1.0));
 }
 
 fn shade(s: Sample) -> Medium {

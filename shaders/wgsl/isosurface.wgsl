@@ -4,7 +4,7 @@
 // there is its colour with its opacity, of no thickness. The framework finds the crossings and
 // merges them in depth; `s.value` is then the surface's value. Light as in `gradient`:
 //
-//     colour = c·(ambient + diffuse·n·l) + specular·m^shininess
+//     colour = min(1, c·(ambient + diffuse·n·l) + specular·m^shininess)
 //
 // with n along the gradient in world units, m after Blinn or Phong, light in world space.
 fn value(s: Sample) -> f32 { return volume(s.position); }
@@ -34,7 +34,7 @@ fn lit(color: vec3<f32>, s: Sample) -> vec3<f32> {
     } else {
         mirrored = max(dot(normal, normalize(l + s.view)), 0.0);
     }
-    return color * (ambient() + diffuse() * cosine) + specular() * pow(mirrored, shininess());
+    return min(color * (ambient() + diffuse() * cosine) + specular() * pow(mirrored, shininess()), vec3<f32>(1.0));
 }
 
 fn shade(s: Sample) -> Medium {

@@ -6,7 +6,7 @@ use std::{
 };
 
 use thiserror::Error;
-use volact_core::{Compositing, Registry, ShaderEntry, registry::RegisterError};
+use volact_core::{Registry, registry::RegisterError};
 use volact_shaders::ShaderError;
 
 /// Why shaders of a folder are not registered.
@@ -40,10 +40,7 @@ pub enum AddShaderError {
 /// If a name is taken.
 pub fn add_builtin(registry: &mut Registry) -> Result<(), RegisterError> {
     let shipped = volact_shaders::builtin().unwrap_or_default();
-    // Crossings of values are not found by any action yet.
-    let drawn = |entry: &ShaderEntry| entry.compositing == Compositing::Over;
-    let new: Vec<_> = shipped.into_iter().filter(drawn).collect();
-    for entry in new {
+    for entry in shipped {
         if registry.shaders().get(&entry.declaration.name).is_none() {
             registry.add_shader(entry)?;
         }

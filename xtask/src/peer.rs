@@ -48,6 +48,11 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<()> {
     let mut registry = Registry::with_core();
     volact_cpu::register(&mut registry)?;
+    for entry in volact_shaders::builtin().map_err(|problems| anyhow::anyhow!("{problems}"))? {
+        if registry.shaders().get(&entry.declaration.name).is_none() {
+            registry.add_shader(entry)?;
+        }
+    }
     let scene = PeerScene::read(&args.scene)?;
     let shape = scene.shape(&args.data)?;
     let desc = scene.frame(&args.view, args.size)?;

@@ -17,6 +17,7 @@ pub struct PeerScene {
     pub mode: String,
     volume: PeerVolume,
     tf: TransferFunction,
+    shading: Option<Shading>,
     background: [f32; 3],
     views: BTreeMap<String, PeerView>,
 }
@@ -34,6 +35,16 @@ struct TransferFunction {
     color: Vec<[f64; 4]>,
     opacity: Vec<[f64; 2]>,
     unit_distance: f64,
+}
+
+/// A head light.
+#[derive(Debug, Deserialize)]
+struct Shading {
+    model: String,
+    ambient: f64,
+    diffuse: f64,
+    specular: f64,
+    power: f64,
 }
 
 #[derive(Debug, Deserialize)]
@@ -66,11 +77,17 @@ impl PeerScene {
         let shader = match self.mode.as_str() {
             "dvr" => "lut",
             "mip" => "mip",
-            other => bail!("mode {other:?} is not drawn yet, wanted dvr or mip"),
+            "shaded" => "gradient",
+            other => bail!("mode is {other:?}, wanted dvr, mip or shaded"),
         };
-        let appearance = Appearance::new(shader)
+        let mut appearance = Appearance::new(shader)
             .with("lookup_table", table(&self.tf.color, &self.tf.opacity)?)
             .with("unit_distance", self.tf.unit_distance);
+        if let Some(light) = self.shading.as_ref().filter(|_| shader == "gradient") {
+            let numbers = [("ambient", light.ambient), ("diffuse", light.diffuse), ("specular", light.specular)];
+            appearance = numbers.into_iter().fold(appearance, |a, (name, value)| a.with(name, value));
+            appearance = appearance.with("shininess", light.power).with("model", light.model.as_str());
+        }
         Ok(Shape::around(&volume, appearance))
     }
 

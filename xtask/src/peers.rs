@@ -13,10 +13,12 @@ use std::{
 use anyhow::{Context, Result, bail};
 use serde_json::Value;
 
-/// The scenes that are unlit.
-const SCENES: [&str; 4] = ["marschner_lobb_256_u8", "blob_cloud_256_u8", "ct_like_u16", "ct_mip_u16"];
-const BEGIN: &str = "<!-- peers: begin -->";
-const END: &str = "<!-- peers: end -->";
+/// The scenes that are unlit, and where their tables go.
+const UNLIT: [&str; 4] = ["marschner_lobb_256_u8", "blob_cloud_256_u8", "ct_like_u16", "ct_mip_u16"];
+const UNLIT_MARKS: [&str; 2] = ["<!-- peers: begin -->", "<!-- peers: end -->"];
+/// The same of the scene lit by its gradient.
+const LIT: [&str; 1] = ["ct_shaded_phong_u16"];
+const LIT_MARKS: [&str; 2] = ["<!-- lit peers: begin -->", "<!-- lit peers: end -->"];
 
 /// Arguments of `peers`.
 #[derive(clap::Args)]
@@ -36,6 +38,15 @@ pub struct Args {
     /// Rounds.
     #[arg(long, default_value_t = 1)]
     rounds: usize,
+    /// The lit scene instead of the unlit ones.
+    #[arg(long)]
+    lit: bool,
+}
+
+impl Args {
+    fn scenes(&self) -> (&'static [&'static str], [&'static str; 2]) {
+        if self.lit { (&LIT, LIT_MARKS) } else { (&UNLIT, UNLIT_MARKS) }
+    }
 }
 
 /// Runs the comparison and writes the tables.
@@ -46,7 +57,7 @@ pub fn run(args: &Args) -> Result<()> {
     let text = fs::read_to_string(&args.log).with_context(|| format!("{}: cannot be read", args.log.display()))?;
     let rows: Vec<Value> = text.lines().filter_map(|l| serde_json::from_str(l).ok()).collect();
     let tables = tables(&rows);
-    replace(&args.report, [BEGIN, END], &tables)
+    replace(&args.report, args.scenes().1, &tables)
 }
 
 /// Puts text between two marks of a document.
@@ -92,7 +103,7 @@ fn measure(args: &Args) -> Result<()> {
         with("volact-step-0.25", "0.25", ""),
     ];
     let mut command = Command::new(&args.python);
-    command.current_dir(&peers).arg("run_all.py").arg("--scenes").args(SCENES);
+    command.current_dir(&peers).arg("run_all.py").arg("--scenes").args(args.scenes().0);
     command
         .args(["--budget", "1.2", "--rounds", &args.rounds.to_string(), "--log"])
         .arg(&log)

@@ -19,6 +19,7 @@ pub mod ops;
 pub mod real;
 mod tidy;
 mod uniforms;
+mod vanish;
 
 pub(crate) use lower::lower;
 

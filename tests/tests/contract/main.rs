@@ -16,4 +16,5 @@ mod programs;
 mod properties;
 mod skipping;
 mod slices;
+mod sources;
 mod tables;

@@ -9,19 +9,24 @@ use volact_conformance::{
 };
 use volact_core::{
     Appearance, Block, Compositing, Declaration, Frame, FrameDesc, ParameterDecl, ParameterType, ParameterValue,
-    Registry, ScalarType, ShaderEntry, ShaderText, Shape, Volume, VolumeDesc,
+    Registry, ScalarType, ShaderEntry, ShaderText, Shape, SliceStyle, Volume, VolumeDesc,
+    VolumeTexture,
     glam::{DAffine3, DMat3, DVec3},
     parameter::Kind,
 };
 
 /// A registry that knows shaders of these names, parameters and texts, too.
 fn with(shaders: &[(&str, Vec<ParameterDecl>, &str)]) -> Registry {
+    with_compositing(shaders, Compositing::Over)
+}
+
+fn with_compositing(shaders: &[(&str, Vec<ParameterDecl>, &str)], compositing: Compositing) -> Registry {
     let mut all = registry();
     for (name, parameters, text) in shaders {
         let declaration =
             Declaration { parameters: parameters.clone(), ..Declaration::new(Kind::Shader, name, "0", "a test") };
         let source = Some(Arc::new(ShaderText { file: format!("{name}.wgsl"), text: (*text).into() }));
-        all.add_shader(ShaderEntry { declaration, compositing: Compositing::Over, source }).unwrap();
+        all.add_shader(ShaderEntry { declaration, compositing, source }).unwrap();
     }
     all
 }
@@ -229,19 +234,22 @@ fn a_wrong_source_is_shown_at_its_place() {
 
 #[test]
 fn what_sources_cannot_do_is_refused_by_name() {
-    let mut all = own();
-    let entry = |name: &str, compositing| {
-        let declaration =
-            Declaration { parameters: classified(), ..Declaration::new(Kind::Shader, name, "0", "a test") };
-        let source = Some(Arc::new(ShaderText { file: format!("{name}.wgsl"), text: OWN.into() }));
-        ShaderEntry { declaration, compositing, source }
-    };
-    all.add_shader(entry("peak", Compositing::Maximum)).unwrap();
-    let shape = by_source(&lut(&constant(1.0, [2, 2, 2]), warm(), 1.0), "peak");
+    let shape = by_source(&lut(&constant(1.0, [2, 2, 2]), warm(), 1.0), "own");
+    let refused = |shape: &Shape| told(&Setup::cpu().action_in(&own()).manage(shape).unwrap_err());
+    shape.set_parameter("lookup_table", warm().pre_interpolated());
+    let error = refused(&shape);
+    assert!(error.contains("\"own\"") && error.contains("pre-interpolated"), "{error}");
+    let text = "fn value(s: Sample) -> f32 { return volume(s.position); }\n\
+                fn shade(s: Sample) -> Medium { return lookup_table(s.value); }";
+    let all = with_compositing(&[("peak", classified(), text)], Compositing::Maximum);
+    let plane = volact_core::Plane::new(DVec3::splat(0.5), DVec3::Y).unwrap();
+    let slices = volact_core::Slices { planes: vec![plane], style: SliceStyle::Opaque, volume: false };
+    let block = Arc::new(Block::new(DVec3::ZERO, DVec3::ONE).unwrap());
+    let sliced = volact_core::Sliced::new(block, slices).unwrap();
+    let look = Appearance::new("peak").with("volume", VolumeTexture::new(&constant(1.0, [2, 2, 2])));
+    let shape = Shape::new(sliced, look.with("lookup_table", warm()).with("unit_distance", 1.0));
     let error = told(&Setup::cpu().action_in(&all).manage(&shape).unwrap_err());
-    assert!(error.contains("\"peak\"") && error.contains("maximum"), "{error}");
-    let error = told(&Setup::exact().action_in(&all).manage(&by_source(&shape, "own")).unwrap_err());
-    assert!(error.contains("\"own\"") && error.contains("reference"), "{error}");
+    assert!(error.contains("slice planes") && error.contains("maximum"), "{error}");
 }
 
 #[test]

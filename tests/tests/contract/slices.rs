@@ -13,8 +13,10 @@ use volact_core::{
     VolumeTexture, glam::DVec3,
 };
 
-fn actions() -> [(&'static str, Setup, f64); 2] {
-    [("reference", Setup::exact(), 6e-8), ("cpu", Setup::post(0.05), 3e-6)]
+fn actions() -> [(&'static str, Setup, f64); 3] {
+    let source = Setup::post(0.05).with("recognise", false);
+    // Colours that change along a mesh's cells are sampled there, not integrated.
+    [("reference", Setup::exact(), 6e-8), ("cpu", Setup::post(0.05), 3e-6), ("cpu, by source", source, 2e-5)]
 }
 
 fn sliced(geometry: Arc<dyn Geometry>, at: &[(DVec3, DVec3)], style: SliceStyle, with_volume: bool) -> Sliced {

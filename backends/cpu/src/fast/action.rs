@@ -18,6 +18,7 @@ use super::{
     picture::Picture,
     plan::Plan,
     resources::Resources,
+    shaded::Chosen,
 };
 
 /// The fast action.
@@ -28,6 +29,7 @@ pub struct CpuAction {
     settings: Settings,
     lifecycle: Lifecycle,
     resources: Resources,
+    chosen: Chosen,
     started: Option<Started>,
     /// Step and way of the last frame: what is managed beside what is drawn does not change them.
     last: Option<Plan>,
@@ -57,6 +59,7 @@ impl CpuAction {
             settings,
             lifecycle: Lifecycle::new(context.clone()),
             resources: Resources::default(),
+            chosen: Chosen::default(),
             started: None,
             last: None,
             said: BTreeSet::new(),
@@ -82,7 +85,8 @@ impl RenderAction for CpuAction {
     }
 
     fn manage(&mut self, shape: &Shape) -> Result<(), ActionError> {
-        self.lifecycle.manage(shape, check)?;
+        let (chosen, recognise) = (&self.chosen, self.settings.recognise);
+        self.lifecycle.manage(shape, |shape| check(&chosen.of(shape, recognise)))?;
         log::debug!("cpu: manages {:?}", shape.name());
         Ok(())
     }
@@ -93,8 +97,9 @@ impl RenderAction for CpuAction {
 
     fn begin_draw(&mut self, frame: &FrameDesc) -> Result<(), ActionError> {
         let start = Instant::now();
-        let open = self.lifecycle.begin(frame, check)?;
-        let shapes: Vec<ResolvedShape> = open.shapes.values().cloned().collect();
+        let (chosen, recognise) = (&self.chosen, self.settings.recognise);
+        let open = self.lifecycle.begin(frame, |shape| check(&chosen.of(shape, recognise)))?;
+        let shapes: Vec<ResolvedShape> = open.shapes.values().map(|s| chosen.of(s, recognise)).collect();
         let managed: Vec<_> = shapes.iter().collect();
         // What is drawn is not known yet: most likely what was drawn last, else everything.
         // Only a distance that was asked for can be refused already: the one chosen for all may be
@@ -125,7 +130,8 @@ impl RenderAction for CpuAction {
     }
 
     fn end_draw(&mut self) -> Result<Frame, ActionError> {
-        let open = self.lifecycle.end()?;
+        let mut open = self.lifecycle.end()?;
+        open.shapes.values_mut().for_each(|shape| self.chosen.apply(shape, self.settings.recognise));
         let Some(Started { at: start, plan: prepared, mut rebuilt }) = self.started.take() else {
             return Err(ActionError::NotDrawing { call: "end_draw" });
         };

@@ -40,7 +40,7 @@ pub fn check(shape: &ResolvedShape) -> Result<(), ActionError> {
     let shader = shape.shader.declaration.name.as_str();
     if shaded::wanted(shape) {
         return match shaded::refused(shape) {
-            Some((what, cure)) => unsupported(what, cure),
+            Some((what, cure)) => unsupported(what, &cure),
             None => Ok(()),
         };
     }

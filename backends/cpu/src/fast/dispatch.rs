@@ -9,6 +9,11 @@ use super::{
     packet::{Bundle, Cuts, Packet, Place, Span},
     preintegrate::SegmentPairs,
     reduce::{self, Reduced},
+    shaded::{
+        self, Skip,
+        field::{self, Field, Places},
+        lookup::{self, Lookup},
+    },
     simd::{LANES, Plain, Simd, Unit},
     sweep::{
         gather::{self, Chunk, Row},
@@ -211,6 +216,56 @@ by_unit! {
         counts: &mut Counts
     ) -> i64,
     S => gather::gather::<S>(job, at, first, done, chunk, counts)
+}
+
+#[inline(always)]
+unsafe fn values_by<S: Simd>(of: &Field<'_>, p: Places<'_>, out: &mut [f32]) {
+    // SAFETY: the caller's promises.
+    by_access!(of.voxels().access(), F => unsafe { field::values::<S, F>(of, p, out) });
+}
+
+#[inline(always)]
+unsafe fn gradients_by<S: Simd>(of: &Field<'_>, p: Places<'_>, out: &mut [&mut [f32]]) {
+    // SAFETY: the caller's promises.
+    by_access!(of.voxels().access(), F => unsafe { field::gradients::<S, F>(of, p, out) });
+}
+
+/// # Safety
+/// None of its own: it is unsafe so that it is called like the kernels.
+#[inline(always)]
+unsafe fn classified_by(table: &Lookup, values: &[f32], out: &mut [&mut [f32]], medium: bool) {
+    lookup::classified(table, values, out, medium);
+}
+
+by_unit! {
+    /// Values of a volume at places, in data units.
+    field_values(of: &Field<'_>, p: Places<'_>, out: &mut [f32]),
+    S => values_by::<S>(of, p, out)
+}
+
+by_unit! {
+    /// Gradients of a volume at places, in data units a world unit.
+    field_gradients(of: &Field<'_>, p: Places<'_>, out: &mut [&mut [f32]]),
+    S => gradients_by::<S>(of, p, out)
+}
+
+by_unit! {
+    /// What a table says of values.
+    classified(table: &Lookup, values: &[f32], out: &mut [&mut [f32]], medium: bool),
+    => classified_by(table, values, out, medium)
+}
+
+by_unit! {
+    /// What lengths of sixteen media add: red, green, blue and extinction by lane.
+    absorb(medium: &[&[f32; LANES]; 4], length: f64, out: &mut Row),
+    S => shaded::absorb::<S>(medium, length, out)
+}
+
+by_unit! {
+    /// Finds the rows of a chunk in which a program may be seen; returns the next segment in which
+    /// there may be something.
+    visible(skip: &Skip<'_>, at: (&Packet, &Cuts), place: (f64, i64), done: u32, found: &mut shaded::Rows) -> i64,
+    S => shaded::visible::<S>(skip, at, place, done, found)
 }
 
 by_unit! {

@@ -1,6 +1,6 @@
 //! Shapes that are one picture each: composited by maximum, minimum, average or add.
 
-use volact_core::{Clip, Compositing, LookupTable, lattice::Lattice, resolve::ResolvedShape, table::ResolvedTable};
+use volact_core::{ActionError, Clip, Compositing, LookupTable, lattice::Lattice, resolve::ResolvedShape, table::ResolvedTable};
 
 use super::{
     bent::{Bent, local},
@@ -12,13 +12,68 @@ use super::{
     part::Region,
     reduce::{self, Reduced},
     resources::{Resources, reduction, voxels},
+    shaded::{self, Flattened},
     simd::{LANES, Unit},
     walk::Counts,
 };
 
 /// A shape composited by maximum, minimum, average or add.
 #[derive(Debug)]
-pub struct Flat<'a> {
+pub enum Flat<'a> {
+    /// Drawn by a kernel.
+    Voxels(Box<Reduction<'a>>),
+    /// By evaluating its shader's source.
+    Program(Box<(Region<'a>, Flattened<'a>)>),
+}
+
+impl<'a> Flat<'a> {
+    /// A resolved shape; `None` where nothing of it can be seen.
+    pub fn new(
+        shape: &'a ResolvedShape,
+        scene: &'a Clip,
+        resources: &'a Resources,
+        settings: &Settings,
+        lattice: Lattice,
+    ) -> Option<Self> {
+        if shaded::wanted(shape) {
+            let region = Region::new(shape, scene, resources)?;
+            let program = Flattened::new(shape, resources.shader(shape.id)?, lattice.step, settings.unit)?;
+            return Some(Self::Program(Box::new((region, program))));
+        }
+        Some(Self::Voxels(Box::new(Reduction::new(shape, scene, resources, settings, lattice)?)))
+    }
+
+    /// The first failure of its program.
+    ///
+    /// # Errors
+    /// That.
+    pub fn check(&self) -> Result<(), ActionError> {
+        match self {
+            Self::Voxels(_) => Ok(()),
+            Self::Program(program) => program.1.check(),
+        }
+    }
+
+    /// Lays its picture over what sixteen rays have seen; returns those that met it.
+    pub fn draw(&self, unit: Unit, bundle: &Bundle, span: &Span, pixels: &mut Pixels, counts: &mut Counts) -> u32 {
+        let (region, program) = match self {
+            Self::Voxels(reduction) => return reduction.draw(unit, bundle, span, pixels, counts),
+            Self::Program(program) => (&program.0, &program.1),
+        };
+        let Some(aimed) = region.aim(unit, bundle, span) else { return 0 };
+        let colors = program.draw(aimed.rays(bundle), aimed.packets().iter(), counts);
+        for (pixel, color) in pixels.color.iter_mut().zip(colors) {
+            if let Some(color) = color {
+                *pixel = lay_over(*pixel, color);
+            }
+        }
+        aimed.stretches.active()
+    }
+}
+
+/// The voxels of such a shape.
+#[derive(Debug)]
+pub struct Reduction<'a> {
     job: reduce::Job<'a>,
     region: Region<'a>,
     units: Units,
@@ -26,9 +81,8 @@ pub struct Flat<'a> {
     unit: f64,
 }
 
-impl<'a> Flat<'a> {
-    /// A resolved shape; `None` where nothing of it can be seen.
-    pub fn new(
+impl<'a> Reduction<'a> {
+    fn new(
         shape: &'a ResolvedShape,
         scene: &'a Clip,
         resources: &'a Resources,
@@ -53,8 +107,7 @@ impl<'a> Flat<'a> {
         Some(Self { job, region, units, table, unit })
     }
 
-    /// Lays its picture over what sixteen rays have seen; returns those that met it.
-    pub fn draw(&self, unit: Unit, bundle: &Bundle, span: &Span, pixels: &mut Pixels, counts: &mut Counts) -> u32 {
+    fn draw(&self, unit: Unit, bundle: &Bundle, span: &Span, pixels: &mut Pixels, counts: &mut Counts) -> u32 {
         let Some(aimed) = self.region.aim(unit, bundle, span) else { return 0 };
         let mut reduced = [Reduced::default(); LANES];
         for span in aimed.stretches.spans() {

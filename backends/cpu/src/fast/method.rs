@@ -27,7 +27,7 @@ pub fn method(drawn: &[&ResolvedShape], plan: &Plan, resources: &Resources, sett
         let pre_integrated = resources.tables(shape.id).is_some_and(|t| t.pre_integrated());
         let table = shape.table("lookup_table").map(LookupTable::interpolation);
         classification.push(match (shape.compositing(), table) {
-            _ if shaded::wanted(shape) => "shader evaluated in the middle of segments",
+            (c, _) if shaded::wanted(shape) => evaluated(c, resources.shader(shape.id)),
             _ if shape.attribute("scalars").is_some() => "linear in each cell",
             (Compositing::Over, Some(TableInterpolation::Pre)) => "pre-interpolated",
             (Compositing::Over, None) => "components",
@@ -50,6 +50,15 @@ pub fn method(drawn: &[&ResolvedShape], plan: &Plan, resources: &Resources, sett
         blend: "f32".into(),
         termination: settings.termination,
         device: caps(settings).device,
+    }
+}
+
+/// How a shader's source is evaluated.
+fn evaluated(compositing: Compositing, shader: Option<&shaded::Shader>) -> &'static str {
+    match compositing {
+        Compositing::First => "crossings found by the shader's values",
+        Compositing::Over if shader.is_some_and(shaded::Shader::pre_integrates) => "shader evaluated over segments",
+        _ => "shader evaluated in the middle of segments",
     }
 }
 

@@ -31,6 +31,8 @@ pub struct Settings {
     pub threads: usize,
     /// Whether transparent space is skipped.
     pub skipping: bool,
+    /// Whether sources that do what a built-in shader does are drawn by its kernel.
+    pub recognise: bool,
     /// The vector unit.
     pub unit: Unit,
 }
@@ -67,6 +69,14 @@ pub fn declaration() -> Declaration {
         .with(
             ParameterDecl::new("skipping", ParameterType::Bool, "skip transparent space; the picture is the same")
                 .default(true),
+        )
+        .with(
+            ParameterDecl::new(
+                "recognise",
+                ParameterType::Bool,
+                "draw sources that do what a built-in shader does by its kernel; else evaluate also those of built-ins",
+            )
+            .default(true),
         )
         .with(
             ParameterDecl::new(
@@ -108,6 +118,7 @@ impl Settings {
             termination: number("termination").unwrap_or(TERMINATION),
             threads: number("threads").filter(|&n| n >= 1.0).map_or_else(all, |n| n as usize),
             skipping: options.get("skipping") != Some(&ParameterValue::Bool(false)),
+            recognise: options.get("recognise") != Some(&ParameterValue::Bool(false)),
             unit,
         })
     }

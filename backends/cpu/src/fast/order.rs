@@ -48,7 +48,7 @@ struct Stretch {
 }
 
 /// The parts that sixteen rays meet.
-type Met<'p, 'a> = [(&'p Part<'a>, Aimed)];
+type Met<'p, 'a> = [(&'p Part<'a>, Aimed<'a>)];
 
 impl Over<'_> {
     /// Draws sixteen rays where `span` holds them, with what ends them; returns those that met
@@ -62,7 +62,7 @@ impl Over<'_> {
         counts: &mut Counts,
     ) -> u32 {
         let aimed = self.parts.iter().filter_map(|p| Some((p, p.region.aim(self.unit, bundle, span)?)));
-        let mut aimed: Vec<(&Part<'_>, Aimed)> = aimed.collect();
+        let mut aimed: Vec<(&Part<'_>, Aimed<'_>)> = aimed.collect();
         let ended = ends.as_ref().map_or(0, |e| e.met);
         let met = aimed.iter().fold(ended, |met, (_, a)| met | a.stretches.active());
         let hits = ends.map(|e| e.hits).filter(|_| ended != 0);
@@ -70,10 +70,10 @@ impl Over<'_> {
             && let Content::Field(field) = &part.content
             && field.seen.is_some()
         {
-            let hits = self.hits(bundle, &aimed, hits);
+            let hits = self.hits(bundle, &aimed, hits, counts);
             return ended | self.cells(bundle, part, only, &hits, pixels, counts);
         }
-        let sliced = aimed.iter().any(|(part, _)| part.is_sliced());
+        let sliced = aimed.iter().any(|(part, _)| part.has_hits());
         if let ([(part, only)], None, false) = (aimed.as_slice(), &hits, sliced)
             && let Content::Voxels(job) = &part.content
             && only.bent.is_none()
@@ -81,7 +81,7 @@ impl Over<'_> {
             self.alone(job, only, pixels, counts);
             return met;
         }
-        let hits = self.hits(bundle, &aimed, hits);
+        let hits = self.hits(bundle, &aimed, hits, counts);
         aimed.retain(|(part, _)| part.volume);
         match self.stretches(&aimed, &hits) {
             Some(stretches) => self.in_order(bundle, &aimed, &stretches, &hits, pixels, counts),
@@ -91,7 +91,7 @@ impl Over<'_> {
     }
 
     /// Draws the only part there is.
-    fn alone(&self, job: &Job<'_>, aimed: &Aimed, pixels: &mut Pixels, counts: &mut Counts) {
+    fn alone(&self, job: &Job<'_>, aimed: &Aimed<'_>, pixels: &mut Pixels, counts: &mut Counts) {
         for span in aimed.stretches.spans() {
             dispatch::draw(job, &aimed.packet.within(span), pixels, counts);
         }
@@ -102,7 +102,7 @@ impl Over<'_> {
         &self,
         bundle: &Bundle,
         part: &Part<'_>,
-        aimed: &Aimed,
+        aimed: &Aimed<'_>,
         hits: &[Vec<Hit>; LANES],
         pixels: &mut Pixels,
         counts: &mut Counts,
@@ -153,10 +153,16 @@ impl Over<'_> {
     }
 
     /// All hits by lane, in order.
-    fn hits(&self, bundle: &Bundle, aimed: &Met<'_, '_>, at_ends: Option<[Vec<Hit>; LANES]>) -> [Vec<Hit>; LANES] {
+    fn hits(
+        &self,
+        bundle: &Bundle,
+        aimed: &Met<'_, '_>,
+        at_ends: Option<[Vec<Hit>; LANES]>,
+        counts: &mut Counts,
+    ) -> [Vec<Hit>; LANES] {
         let mut hits = at_ends.unwrap_or_default();
-        for (part, aimed) in aimed.iter().filter(|(part, _)| part.is_sliced()) {
-            part.slice(bundle, aimed, &mut hits);
+        for (part, aimed) in aimed.iter().filter(|(part, _)| part.has_hits()) {
+            part.hits(bundle, aimed, &mut hits, counts);
         }
         // Where sums are made in the order of colours they depend on no other order.
         let order = |a: &Hit, b: &Hit| {
@@ -170,10 +176,10 @@ impl Over<'_> {
     /// The stretches of each lane in order; `None` where some overlap, hold a hit, or have no kernel
     /// of their own.
     fn stretches(&self, aimed: &Met<'_, '_>, hits: &[Vec<Hit>; LANES]) -> Option<[Vec<Stretch>; LANES]> {
-        let alone = |(part, aimed): &(&Part<'_>, Aimed)| match &part.content {
+        let alone = |(part, aimed): &(&Part<'_>, Aimed<'_>)| match &part.content {
             Content::Voxels(_) => aimed.bent.is_none(),
             Content::Field(field) => field.seen.is_some(),
-            Content::Shaded(_) => false,
+            Content::Shaded(_) | Content::Crossings(_) => false,
         };
         if !aimed.iter().all(alone) {
             return None;
@@ -221,7 +227,7 @@ impl Over<'_> {
                 Content::Voxels(job) => dispatch::draw(job, &packet.within(&span), pixels, counts),
                 Content::Field(_) => drop(self.walk(bundle, drawn, &[span], pixels, counts)),
                 // Without a kernel of its own it is never here: see `stretches`.
-                Content::Shaded(_) => {}
+                Content::Shaded(_) | Content::Crossings(_) => {}
             }
             (0..LANES).for_each(|l| next[l] += (span.active >> l & 1) as usize);
         }
@@ -265,10 +271,12 @@ impl Over<'_> {
                     stretches: &aimed.stretches,
                 }),
                 Content::Shaded(shaded) => layers.push(Layer {
-                    look: Look::Shaded { shaded: shaded.as_ref(), bundle },
+                    look: Look::Shaded { shaded: shaded.as_ref(), rays: aimed.rays(bundle) },
                     packet: &aimed.packet,
                     stretches: &aimed.stretches,
                 }),
+                // Their hits are all there is of them.
+                Content::Crossings(_) => {}
                 Content::Field(field) => {
                     let rays = bundle.through(&part.region.place.to_object);
                     for (l, pieces) in pieces.iter_mut().enumerate() {

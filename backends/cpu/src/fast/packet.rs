@@ -272,6 +272,13 @@ fn transform(by: &DAffine3, v: &Vectors, offset: DVec3) -> Vectors {
     [row(0), row(1), row(2)]
 }
 
+impl Bundle {
+    /// Points at `t = 0` from an origin on.
+    pub fn local(&self, origin: DVec3) -> Vectors {
+        std::array::from_fn(|a| self.origin[a].map(|v| v - origin[a]))
+    }
+}
+
 /// The intervals of a packet, cut by the lattice.
 #[derive(Clone, Debug)]
 pub struct Cuts {

@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 
 use volact_core::{
-    Aabb, ActionError, Attribute, Clip, LookupTable, Plane, SliceStyle, camera::LinearRays, glam::DVec3,
+    Aabb, ActionError, Attribute, Clip, Compositing, LookupTable, Plane, SliceStyle, camera::LinearRays, glam::DVec3,
     lattice::Lattice, resolve::ResolvedShape, table::ResolvedTable,
 };
 
@@ -17,10 +17,15 @@ use super::{
     over,
     packet::{Bundle, Packet, Place, Span, Vectors},
     resources::{Prepared, Resources, voxels},
-    shaded::{self, Shaded},
+    shaded::{
+        self, Crossings, Dense,
+        batch::Rays,
+        trail::{Cells, Trail},
+    },
     simd::{LANES, Unit},
     stretches::Stretches,
     sweep::piece::{Hit, Piece, Run, cut},
+    walk::Counts,
 };
 
 /// Where a shape is.
@@ -34,17 +39,33 @@ pub struct Region<'a> {
     mesh: Option<&'a Linked>,
     /// How the mesh carries the volume along.
     bend: Option<Bend<'a>>,
+    /// The cells that programs ask about.
+    cells: Option<Cells<'a>>,
 }
 
 /// Sixteen rays where they are in a region.
 #[derive(Debug)]
-pub struct Aimed {
+pub struct Aimed<'a> {
     /// In sample space, from the first entry to the last exit.
     pub packet: Packet,
     /// Where they are inside.
     pub stretches: Stretches,
     /// The way through sample space, where it is not straight.
     pub bent: Option<Box<Bent>>,
+    /// The cells that they pass, where programs ask about them.
+    trail: Option<Box<Trail<'a>>>,
+}
+
+impl Aimed<'_> {
+    /// The rays as programs see them.
+    pub fn rays<'r>(&'r self, bundle: &'r Bundle) -> Rays<'r> {
+        Rays { bundle, trail: self.trail.as_deref() }
+    }
+
+    /// The first, second, … stretches of rays in sample space.
+    pub fn packets(&self) -> Vec<Packet> {
+        self.stretches.spans().iter().map(|span| self.packet.within(span)).collect()
+    }
 }
 
 impl<'a> Region<'a> {
@@ -72,7 +93,13 @@ impl<'a> Region<'a> {
         }
         let to_index = texture.map(|t| t.object_to_index()).unwrap_or_default();
         let place = Place { to_object: shape.to_object, to_index, block };
-        Some(Self { place, clip: &shape.state.clip, scene, mesh: mesh.map(|m| &m.linked), bend })
+        let asked = shaded::by_cells(shape) || shaded::wanted(shape) && bend.is_some();
+        let cells = mesh.filter(|_| asked).map(|m| Cells {
+            mesh: &m.linked,
+            texture: m.texture.as_ref().filter(|_| bend.is_some()),
+            to_object: shape.to_object,
+        });
+        Some(Self { place, clip: &shape.state.clip, scene, mesh: mesh.map(|m| &m.linked), bend, cells })
     }
 
     /// Whether rays are straight in sample space and stay inside from one end to the other.
@@ -81,7 +108,7 @@ impl<'a> Region<'a> {
     }
 
     /// The rays of a bundle where `span` and this region hold them; `None` where they miss it.
-    pub fn aim(&self, unit: Unit, bundle: &Bundle, span: &Span) -> Option<Aimed> {
+    pub fn aim(&self, unit: Unit, bundle: &Bundle, span: &Span) -> Option<Aimed<'a>> {
         let packet = dispatch::aim(unit, bundle, span, &self.place);
         if packet.active == 0 {
             return None;
@@ -92,7 +119,12 @@ impl<'a> Region<'a> {
             None => Stretches::one(packet.span()),
         };
         self.clip(bundle, &mut stretches);
-        (stretches.active() != 0).then_some(Aimed { packet, stretches, bent })
+        if stretches.active() == 0 {
+            return None;
+        }
+        let trail = |cells| Box::new(Trail::new(cells, &bundle.through(&self.place.to_object), &stretches));
+        let trail = self.cells.map(trail);
+        Some(Aimed { packet, stretches, bent, trail })
     }
 
     /// Takes away what is clipped.
@@ -247,7 +279,9 @@ pub enum Content<'a> {
     /// Numbers at a mesh's vertices.
     Field(Box<Field<'a>>),
     /// What a shader's program makes of places on the lattice.
-    Shaded(Box<Shaded<'a>>),
+    Shaded(Box<Dense<'a>>),
+    /// Surfaces where a shader's value crosses given ones.
+    Crossings(Box<Crossings<'a>>),
 }
 
 /// How a picture is looked at.
@@ -296,10 +330,7 @@ impl<'a> Part<'a> {
     ) -> Option<Self> {
         let mut region = Region::new(shape, scene, resources)?;
         let (content, medium) = match shape.volume("volume") {
-            _ if shaded::wanted(shape) => {
-                let shaded = Shaded::new(shape, resources.shader(shape.id)?, lattice.step, eyes.settings.unit);
-                (Content::Shaded(Box::new(shaded)), None)
-            }
+            _ if shaded::wanted(shape) => (Self::shaded(shape, &region, resources, lattice, eyes)?, None),
             Some(texture) => {
                 let tables = resources.tables(shape.id)?;
                 let job = over::Job {
@@ -324,7 +355,25 @@ impl<'a> Part<'a> {
         };
         let slices = shape.state.geometry.slices();
         let slicing = slices.map(|s| Slicing { planes: &s.planes, style: s.style, medium });
-        Some(Self { id: shape.id, region, content, volume: slices.is_none_or(|s| s.volume), slicing })
+        let volume = slices.is_none_or(|s| s.volume) && !matches!(content, Content::Crossings(_));
+        Some(Self { id: shape.id, region, content, volume, slicing })
+    }
+
+    /// What is seen of a shape whose shader's source is evaluated.
+    fn shaded(
+        shape: &'a ResolvedShape,
+        region: &Region<'a>,
+        resources: &'a Resources,
+        lattice: Lattice,
+        eyes: &Eyes<'_>,
+    ) -> Option<Content<'a>> {
+        let (shader, unit) = (resources.shader(shape.id)?, eyes.settings.unit);
+        if shape.compositing() == Compositing::First {
+            let stop = eyes.settings.termination as f32;
+            return Some(Content::Crossings(Box::new(Crossings::new(shape, shader, lattice.step, stop, unit)?)));
+        }
+        let skip = (!region.is_bent()).then(|| resources.skip(shape, unit)).flatten();
+        Some(Content::Shaded(Box::new(Dense::new(shape, shader, skip, lattice.step, unit))))
     }
 
     /// The first failure of its program.
@@ -334,18 +383,41 @@ impl<'a> Part<'a> {
     pub fn check(&self) -> Result<(), ActionError> {
         match &self.content {
             Content::Shaded(shaded) => shaded.check(),
+            Content::Crossings(crossings) => crossings.check(),
             _ => Ok(()),
         }
     }
 
-    /// Whether it has planes.
-    pub fn is_sliced(&self) -> bool {
-        self.slicing.is_some()
+    /// Whether there are planes or surfaces in it.
+    pub fn has_hits(&self) -> bool {
+        self.slicing.is_some() || matches!(self.content, Content::Crossings(_))
     }
 
-    /// Adds the hits of rays on this part's planes to those of each lane.
-    pub fn slice(&self, bundle: &Bundle, aimed: &Aimed, hits: &mut [Vec<Hit>; LANES]) {
+    /// Adds the hits of rays on this part's planes and surfaces to those of each lane.
+    pub fn hits(&self, bundle: &Bundle, aimed: &Aimed<'_>, hits: &mut [Vec<Hit>; LANES], counts: &mut Counts) {
+        if let Content::Crossings(crossings) = &self.content {
+            crossings.hits(aimed.rays(bundle), aimed.packets().iter(), hits, counts);
+        }
         let Some(slicing) = &self.slicing else { return };
+        if let Content::Shaded(shaded) = &self.content {
+            let opaque = slicing.style == SliceStyle::Opaque;
+            let rays = bundle.through(&self.region.place.to_object);
+            for plane in slicing.planes {
+                let (mut live, mut t) = (0u32, [0.0; LANES]);
+                for l in (0..LANES).filter(|l| aimed.stretches.active() >> l & 1 == 1) {
+                    let [origin, direction] = lane(&rays, l);
+                    if let Some(met) = plane.meets(origin, direction).filter(|&t| aimed.stretches.holds(l, t)) {
+                        (live, t[l]) = (live | 1 << l, met);
+                    }
+                }
+                if live != 0 {
+                    counts.samples += u64::from(live.count_ones());
+                    counts.lattice += u64::from(live.count_ones());
+                    shaded.planes(aimed.rays(bundle), (t, live), opaque, hits);
+                }
+            }
+            return;
+        }
         let rays = bundle.through(&self.region.place.to_object);
         for (l, hits) in hits.iter_mut().enumerate().filter(|(l, _)| aimed.stretches.active() >> l & 1 == 1) {
             let ray = lane(&rays, l);
@@ -366,7 +438,7 @@ impl<'a> Part<'a> {
     }
 
     /// Sample coordinates.
-    fn sample(&self, aimed: &Aimed, l: usize, t: f64) -> DVec3 {
+    fn sample(&self, aimed: &Aimed<'_>, l: usize, t: f64) -> DVec3 {
         match &aimed.bent {
             Some(bent) => bent.at(l, t),
             None => DVec3::from_array(aimed.packet.at(l, t)),

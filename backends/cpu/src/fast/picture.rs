@@ -57,7 +57,7 @@ impl<'a> Picture<'a> {
         let of = |compositing: &'static dyn Fn(Compositing) -> bool| {
             drawn.iter().copied().filter(move |s| compositing(s.compositing()))
         };
-        let mut parts: Vec<Part<'a>> = of(&|c| c == Compositing::Over).filter_map(part).collect();
+        let mut parts: Vec<Part<'a>> = of(&|c| matches!(c, Compositing::Over | Compositing::First)).filter_map(part).collect();
         parts.sort_by_key(|part| part.id);
         let termination = settings.termination as f32;
         Ok(Self {
@@ -126,7 +126,8 @@ impl<'a> Picture<'a> {
     /// # Errors
     /// That.
     pub fn check(&self) -> Result<(), ActionError> {
-        self.over.parts.iter().try_for_each(Part::check)
+        self.over.parts.iter().try_for_each(Part::check)?;
+        self.flat.iter().try_for_each(Flat::check)
     }
 
     /// Draws sixteen rays; returns those that met something.

@@ -7,6 +7,9 @@ use super::{check::NAME, options::Settings, shaded};
 /// Most segments of the lattice along the diagonal of what is drawn.
 const MOST_SEGMENTS: f64 = 1e7;
 
+/// Segments along the diagonal of a shape without voxels that a shader's source draws.
+const PARTS: f64 = 512.0;
+
 /// What tables depend on beside their shape.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
@@ -50,7 +53,11 @@ impl Plan {
 
 fn distance(shapes: &[&ResolvedShape], settings: &Settings) -> f64 {
     let voxel = |s: &&ResolvedShape| s.first_volume().map(|t| smallest_voxel(t, &s.state.transform));
-    let smallest = shapes.iter().filter_map(voxel).fold(f64::INFINITY, f64::min);
+    let size = |s: &ResolvedShape| s.state.world_bounds().size().length();
+    // A source without a volume says nothing of how fine it is.
+    let part = |s: &&ResolvedShape| shaded::wanted(s).then(|| 2.0 * size(s) / PARTS);
+    let smallest = shapes.iter().filter_map(|s| voxel(s).or_else(|| part(s)));
+    let smallest = smallest.filter(|v| *v > 0.0).fold(f64::INFINITY, f64::min);
     settings.sample_distance.unwrap_or(if smallest.is_finite() { smallest / 2.0 } else { 1.0 })
 }
 

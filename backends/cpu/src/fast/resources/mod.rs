@@ -26,7 +26,8 @@ use super::{
     mesh::numbers::Numbers,
     options::{Classification, Settings},
     plan::Plan,
-    shaded::{self, Shader},
+    shaded::{self, Shader, Skip},
+    simd::Unit,
 };
 
 pub use solids::{Prepared, Solid};
@@ -60,6 +61,23 @@ pub struct Resources {
     numbers: BTreeMap<u64, Numbers>,
     /// By shape.
     shaders: BTreeMap<u64, Shader>,
+    /// By shape.
+    vacant: BTreeMap<u64, Vacant>,
+}
+
+/// Where a program is transparent.
+#[derive(Debug)]
+struct Vacant {
+    key: VacantKey,
+    empty: Option<Emptiness>,
+}
+
+/// What that depends on.
+#[derive(Clone, Debug, PartialEq)]
+struct VacantKey {
+    bounds: BoundsKey,
+    table: u64,
+    range: [f64; 2],
 }
 
 /// A geometry made ready. While it is kept, no other has its address.
@@ -125,12 +143,20 @@ pub fn voxels<'a>(shape: &ResolvedShape, texture: &'a VolumeTexture) -> (Voxels<
 }
 
 fn bounds_key(shape: &ResolvedShape, texture: &VolumeTexture) -> BoundsKey {
+    key_of(texture, &voxels(shape, texture).0)
+}
+
+/// The same of voxels as programs read them.
+fn plain_key(shape: &ResolvedShape, texture: &VolumeTexture) -> BoundsKey {
+    key_of(texture, &plain_voxels(texture, shaded::component(shape)).0)
+}
+
+fn key_of(texture: &VolumeTexture, voxels: &Voxels<'_>) -> BoundsKey {
     let Roi { min, max } = texture.data_roi();
     let volume = texture.volume();
     let roi = [min[0], min[1], min[2], max[0], max[1], max[2]];
-    let voxels = voxels(shape, texture).0;
     let units = [voxels.origin.to_bits(), voxels.gain.to_bits()];
-    BoundsKey { volume: volume.id(), version: volume.version(), component: component(shape), roi, units }
+    BoundsKey { volume: volume.id(), version: volume.version(), component: voxels.component, roi, units }
 }
 
 /// How a shape's numbers are reduced: a map to data units that falls makes a maximum of the
@@ -171,7 +197,8 @@ impl Resources {
             };
             let bent = self.prepare_geometry(shape, progress, &mut say)?;
             if shaded::wanted(shape) {
-                self.prepare_shader(shape, &mut say)?;
+                let settings = if bent || plan.mixes(shape.id) { &post } else { settings };
+                self.prepare_shader(shape, settings, &mut say)?;
                 continue;
             }
             let Some(texture) = shape.volume("volume") else {
@@ -191,7 +218,11 @@ impl Resources {
         let mut geometries = Vec::new();
         for shape in shapes {
             ids.push(shape.id);
-            keys.extend(shape.volume("volume").map(|t| bounds_key(shape, t)));
+            if shaded::wanted(shape) {
+                keys.extend(shape.first_volume().map(|t| plain_key(shape, t)));
+            } else {
+                keys.extend(shape.volume("volume").map(|t| bounds_key(shape, t)));
+            }
             geometries.push(Kept::address(solids::whole(shape)));
         }
         self.bounds.retain(|key, _| keys.contains(key));
@@ -201,6 +232,7 @@ impl Resources {
         self.geometries.retain(|address, _| geometries.contains(address));
         self.numbers.retain(|id, _| ids.contains(id));
         self.shaders.retain(|id, _| ids.contains(id));
+        self.vacant.retain(|id, _| ids.contains(id));
     }
 
     /// Bytes held.
@@ -214,6 +246,8 @@ impl Resources {
             + self.peaks.values().map(Peaks::bytes).sum::<usize>()
             + self.geometries.values().map(|kept| kept.prepared.bytes()).sum::<usize>()
             + self.numbers.values().map(Numbers::bytes).sum::<usize>()
+            + self.shaders.values().map(Shader::bytes).sum::<usize>()
+            + self.vacant.values().filter_map(|v| v.empty.as_ref()).map(Emptiness::bytes).sum::<usize>()
     }
 
     /// Tables of a shape.
@@ -229,6 +263,13 @@ impl Resources {
     /// The program of a shape's shader, where that is evaluated.
     pub fn shader(&self, id: u64) -> Option<&Shader> {
         self.shaders.get(&id)
+    }
+
+    /// What of a shape's program can be skipped.
+    pub fn skip<'a>(&'a self, shape: &'a ResolvedShape, unit: Unit) -> Option<Skip<'a>> {
+        let empty = self.vacant.get(&shape.id)?.empty.as_ref()?;
+        let (voxels, _) = plain_voxels(shape.first_volume()?, shaded::component(shape));
+        Some(Skip { voxels, empty, unit })
     }
 
     /// The geometry of a shape as it was made ready; `None` where it is a box.
@@ -291,16 +332,63 @@ impl Resources {
         }
     }
 
-    fn prepare_shader(&mut self, shape: &ResolvedShape, say: &mut impl FnMut(&str, usize)) -> Result<(), ActionError> {
-        let kept = self.shaders.remove(&shape.id);
-        if let Some(kept) = kept.filter(|kept| kept.serves(shape)) {
-            self.shaders.insert(shape.id, kept);
-            return Ok(());
-        }
-        let made = Shader::new(shape)?;
-        say("shader", made.bytes());
-        self.shaders.insert(shape.id, made);
+    fn prepare_shader(
+        &mut self,
+        shape: &ResolvedShape,
+        settings: &Settings,
+        say: &mut impl FnMut(&str, usize),
+    ) -> Result<(), ActionError> {
+        let kept = self.shaders.remove(&shape.id).filter(|kept| kept.serves(shape, settings.classification));
+        let shader = match kept {
+            Some(kept) => kept,
+            None => {
+                let made = Shader::new(shape, settings.classification)?;
+                say("shader", made.bytes());
+                made
+            }
+        };
+        self.prepare_vacant(shape, &shader, settings, say);
+        self.shaders.insert(shape.id, shader);
         Ok(())
+    }
+
+    /// Finds where a shape's program is transparent, as far as values tell.
+    fn prepare_vacant(
+        &mut self,
+        shape: &ResolvedShape,
+        shader: &Shader,
+        settings: &Settings,
+        say: &mut impl FnMut(&str, usize),
+    ) {
+        let found = shader.transparent_with().filter(|_| settings.skipping).and_then(|[volume, table]| {
+            // Rays are followed in the samples of the first volume.
+            let texture = shape.volume(volume).filter(|t| shape.first_volume().is_some_and(|f| std::ptr::eq(*t, f)))?;
+            Some((texture, shape.table(table)?))
+        });
+        let Some((texture, table)) = found else {
+            self.vacant.remove(&shape.id);
+            return;
+        };
+        let (voxels, units) = plain_voxels(texture, shaded::component(shape));
+        let key = VacantKey { bounds: plain_key(shape, texture), table: table.id(), range: texture.range() };
+        if self.vacant.get(&shape.id).is_some_and(|v| v.key == key) {
+            return;
+        }
+        let bounds = match self.bounds.get(&key.bounds) {
+            Some(bounds) => Arc::clone(bounds),
+            None => {
+                let bounds = Arc::new(ValueBounds::new(&voxels, settings.threads));
+                say("value bounds", bounds.bytes());
+                self.bounds.insert(key.bounds, Arc::clone(&bounds));
+                bounds
+            }
+        };
+        let empty = bounds.emptiness(tables::opaque(&table.resolve(texture.range()), units));
+        let empty = Some(empty).filter(Emptiness::any);
+        if let Some(empty) = &empty {
+            say("occupancy", empty.bytes());
+        }
+        self.vacant.insert(shape.id, Vacant { key, empty });
     }
 
     fn prepare_volume(

@@ -66,7 +66,8 @@ pub fn whole(shape: &ResolvedShape) -> &Arc<dyn Geometry> {
 
 /// Whether a shape is drawn through its tetrahedra or triangles.
 pub fn wanted(shape: &ResolvedShape) -> bool {
-    shape.state.geometry.as_block().is_none() || shape.first_volume().is_none() && !shaded::wanted(shape)
+    let cells = if shaded::wanted(shape) { shaded::by_cells(shape) } else { shape.first_volume().is_none() };
+    cells || shape.state.geometry.as_block().is_none()
 }
 
 /// Makes a geometry ready.
@@ -112,12 +113,11 @@ pub fn check_attributes(shape: &ResolvedShape, solid: &Solid) -> Result<(), Acti
     if shape.state.geometry.vertex_count().is_some() {
         return Ok(());
     }
-    let names = ["scalars", "opacity_scalars"].into_iter();
-    let wrong = names.filter_map(|name| Some((name, shape.attribute(name)?)));
-    let wrong = wrong.filter(|(_, a)| a.len() != solid.vertices);
+    let attributes = shape.parameters.keys().filter_map(|name| Some((name, shape.attribute(name)?)));
+    let wrong = attributes.filter(|(_, a)| a.len() != solid.vertices);
     let problems: Vec<_> = wrong
         .map(|(name, a)| ParameterProblem {
-            name: name.into(),
+            name: name.clone(),
             kind: ProblemKind::Mistyped {
                 found: format!("attribute {:?} of {} vertices", a.name, a.len()),
                 wanted: format!("one of {}, the geometry's", solid.vertices),

@@ -96,13 +96,7 @@ impl Tables {
             }
             Some((TableInterpolation::Pre, table)) => {
                 let direct = Direct::voxels(&table, &voxels, units, length);
-                let seen = |lo: f32, hi: f32| {
-                    let [a, b] = [lo, hi].map(|v| units.data(f64::from(v)));
-                    // A little more, for what rounding of numbers may let in.
-                    let wide = 1e-6 * (a.abs() + b.abs());
-                    table.max_opacity(a.min(b) - wide, a.max(b) + wide) > 0.0
-                };
-                (Made::Direct(direct), bounds.map(|b| b.emptiness(seen)))
+                (Made::Direct(direct), bounds.map(|b| b.emptiness(opaque(&table, units))))
             }
             Some((TableInterpolation::Post, table)) => {
                 // The same with and without skipping, so that tables and picture are the same.
@@ -156,6 +150,16 @@ impl Tables {
             Made::Direct(direct) => direct.bytes(),
         };
         made + self.empty.as_ref().map_or(0, Emptiness::bytes)
+    }
+}
+
+/// Whether a table is opaque anywhere between two numbers.
+pub fn opaque(table: &ResolvedTable, units: Units) -> impl Fn(f32, f32) -> bool {
+    move |lo, hi| {
+        let [a, b] = [lo, hi].map(|v| units.data(f64::from(v)));
+        // A little more, for what rounding of numbers may let in.
+        let wide = 1e-6 * (a.abs() + b.abs());
+        table.max_opacity(a.min(b) - wide, a.max(b) + wide) > 0.0
     }
 }
 

@@ -15,7 +15,8 @@ use super::{
     bent::Bent,
     dispatch,
     over::{Job, Pixels, entries},
-    packet::{Bundle, Cuts, Packet},
+    packet::{Cuts, Packet},
+    shaded::batch::Rays,
     simd::{LANES, Unit},
     stretches::Stretches,
     walk::{ALL, CHUNK, Counts},
@@ -50,8 +51,8 @@ pub enum Look<'a> {
     Shaded {
         /// What evaluates.
         shaded: &'a (dyn Batches + 'a),
-        /// The rays in world space.
-        bundle: &'a Bundle,
+        /// The rays as programs see them.
+        rays: Rays<'a>,
     },
 }
 
@@ -59,14 +60,14 @@ pub enum Look<'a> {
 pub trait Batches: std::fmt::Debug {
     /// What whole segments would add by what cut segments hold, and the lanes in which there is
     /// one to take.
-    fn entries(&self, bundle: &Bundle, cut: &[[f64; 2]; LANES], done: u32, counts: &mut Counts) -> (Row, u32);
+    fn entries(&self, rays: Rays<'_>, cut: &[[f64; 2]; LANES], done: u32, counts: &mut Counts) -> (Row, u32);
 
     /// Gathers the whole segments of one stretch in the chunk that begins with segment `first`;
     /// returns the next segment in which there may be something.
     fn gather(
         &self,
-        bundle: &Bundle,
-        cuts: &Cuts,
+        rays: Rays<'_>,
+        at: (&Packet, &Cuts),
         first: i64,
         done: u32,
         chunk: &mut Chunk,
@@ -183,7 +184,7 @@ impl<'a> Sweep<'a> {
                 let (entries, wanted) = match look {
                     Look::Voxels { job, bent: Some(bent) } => bent.entries(job, ends, self.done, counts),
                     Look::Voxels { job, bent: None } => entries(job, &packet, ends, self.done, counts),
-                    Look::Shaded { shaded, bundle } => shaded.entries(bundle, ends, self.done, counts),
+                    Look::Shaded { shaded, rays } => shaded.entries(rays, ends, self.done, counts),
                 };
                 for l in (0..LANES).filter(|l| wanted >> l & 1 == 1 && entries[*l][3] > 0.0) {
                     let k = (0.5 * (ends[l][0] + ends[l][1]) / self.scene.step).floor() as i64;
@@ -259,7 +260,7 @@ impl<'a> Sweep<'a> {
                 Look::Voxels { job, bent: None } => {
                     dispatch::gather(self.unit, job, at, first, self.done, chunk, counts)
                 }
-                Look::Shaded { shaded, bundle } => shaded.gather(bundle, &walk.cuts, first, self.done, chunk, counts),
+                Look::Shaded { shaded, rays } => shaded.gather(rays, at, first, self.done, chunk, counts),
             };
         }
     }
