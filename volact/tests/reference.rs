@@ -139,3 +139,21 @@ fn shaders_of_ones_own_have_pages_and_pictures() {
     assert_eq!(output.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&output.stderr).contains("shader-own.ron"));
 }
+
+#[test]
+fn all_is_described_in_full_or_not_at_all() {
+    let run = |arguments: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_volact"));
+        command.arg("describe").args(arguments).env("VOLACT_CONFIG", "").env_remove("VOLACT_LOG").output().unwrap()
+    };
+    let output = run(&["--all"]);
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    for d in Registry::with_builtins().declarations() {
+        let head = format!("{} {} {}\n", d.kind.name(), d.name, d.version);
+        assert!(text.contains(&head), "{head}");
+        assert!(d.parameters.iter().all(|p| text.contains(&format!("\n    {}: ", p.name))), "{head}");
+    }
+    for wrong in [&["cpu", "--all"][..], &["--markdown", "pages"], &["--all", "--text-only"]] {
+        assert_eq!(run(wrong).status.code(), Some(2), "{wrong:?}");
+    }
+}

@@ -135,7 +135,8 @@ impl Snapshot {
     /// How many files and folders there are, in words.
     pub fn summary(&self) -> String {
         let count = |n: usize, one: &str| if n == 1 { format!("1 {one}") } else { format!("{n} {one}s") };
-        format!("{} in {}", count(self.flat().len(), "file"), count(self.folders().len(), "folder"))
+        let there = self.flat().into_values().filter(|stamp| **stamp != Stamp::Missing).count();
+        format!("{} in {}", count(there, "file"), count(self.folders().len(), "folder"))
     }
 
     fn flat(&self) -> BTreeMap<&Path, &Stamp> {
