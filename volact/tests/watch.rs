@@ -231,10 +231,10 @@ fn files_that_vanish_and_return_and_bursts_are_taken_as_they_are() {
     // What changes nothing is not drawn: the next message is about the edit after it.
     let same = fs::read(w.place("own.wgsl")).unwrap();
     let said = w.hear("drawn in", |place| {
-        fs::write(place.join("own.wgsl"), same).unwrap();
+        replace(&place.join("own.wgsl"), same);
         fs::write(place.join("notes.txt"), "nothing of the picture").unwrap();
         thread::sleep(Duration::from_millis(300));
-        fs::write(place.join("scene.ron"), scene("own", "(0, 0, 1, 1)")).unwrap();
+        replace(&place.join("scene.ron"), scene("own", "(0, 0, 1, 1)"));
     });
     assert_eq!(said.matches("drawn in").count(), 1, "{said}");
 }
