@@ -249,7 +249,8 @@ mod tests {
         let registry = Registry::with_builtins();
         let first = shape(&volume, 60.0, 1.0);
         let choice =
-            select::select(&registry, &Config::default(), Some("cpu"), &Options::new(), &[first.clone()]).unwrap();
+            select::select(&registry, &Config::default(), Some("cpu"), &Options::new(), std::slice::from_ref(&first))
+                .unwrap();
         let frame = volact::FrameDesc::fit(&first, volact::View::Front, 24, 24);
         let mut source = Source { shapes: vec![first.clone()], frame, choice, notes: Vec::new() };
         let mut draw = |wanted: &[Shape]| {
