@@ -2,6 +2,7 @@
 
 mod check;
 mod docs;
+mod evaluator;
 mod header;
 mod mesh_peers;
 mod new_plugin;
@@ -37,6 +38,8 @@ enum Task {
     Header,
     /// Make a plugin's crate that builds, tests itself and draws something.
     NewPlugin(new_plugin::Args),
+    /// Time shaders that are drawn by evaluating their sources, beside a kernel.
+    Evaluator(evaluator::Args),
     /// Time `cpu` over picture sizes, volume sizes and threads.
     Scaling,
 }
@@ -51,6 +54,7 @@ fn main() -> anyhow::Result<()> {
         Task::Docs(args) => docs::run(&args),
         Task::Header => header::run(),
         Task::NewPlugin(args) => new_plugin::run(&args),
+        Task::Evaluator(args) => evaluator::run(&args),
         Task::Scaling => scaling::run(),
     }
 }

@@ -106,7 +106,7 @@ fn time(registry: &Registry, options: &Options, shapes: &[Shape], size: usize) -
 }
 
 /// A smooth field that is semi-transparent everywhere, so that nothing is skipped.
-fn ripples(n: usize) -> Result<Shape> {
+pub fn ripples(n: usize) -> Result<Shape> {
     let mut voxels = Vec::with_capacity(n * n * n);
     let at = |i: usize| i as f64 / (n - 1) as f64 * 12.0;
     for z in 0..n {

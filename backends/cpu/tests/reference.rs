@@ -30,6 +30,18 @@ mod mesh_volume;
 mod opaque;
 #[path = "reference/slices.rs"]
 mod slices;
+#[path = "reference/source_common.rs"]
+mod source_common;
+#[path = "reference/source_flat.rs"]
+mod source_flat;
+#[path = "reference/source_mesh.rs"]
+mod source_mesh;
+#[path = "reference/source_over.rs"]
+mod source_over;
+#[path = "reference/source_refused.rs"]
+mod source_refused;
+#[path = "reference/source_scene.rs"]
+mod source_scene;
 #[path = "reference/speed.rs"]
 mod speed;
 #[path = "reference/surfaces.rs"]

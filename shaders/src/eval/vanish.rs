@@ -10,7 +10,7 @@ use super::{
     Kernel, Real,
     code::{Class, Inst, Reg, Touch, touches},
     kernel::Field,
-    ops::Float2,
+    ops::{Float1, Float2},
 };
 use crate::signatures::Derived;
 
@@ -73,6 +73,9 @@ impl<F: Real> Kernel<F> {
                 let factor = |v: Option<Known>| v.filter(|v| matches!(v, Known::Zero | Known::Vanishes(..)));
                 one(to, factor(of(a)).or(factor(of(b))))
             }
+            Inst::Float2(Float2::Divide, to, [a, _]) | Inst::Float1(Float1::Negate | Float1::Abs | Float1::Sqrt | Float1::Saturate | Float1::Absorption, to, a) => {
+                one(to, of(a).filter(|v| matches!(v, Known::Zero | Known::Vanishes(..))))
+            }
             Inst::Copy { class: Class::Float, to, from } => one(to, of(from)),
             Inst::Select { class: Class::Float, to, accept, reject, .. } => {
                 one(to, of(accept).zip(of(reject)).and_then(|(a, b)| both(a, b)))
@@ -101,7 +104,7 @@ impl<F: Real> Kernel<F> {
         let place = |i: usize, known| results.get(i).copied().flatten().map(|reg| (reg, known)).into_iter().collect();
         match derived {
             Some(Derived::Value) if here => place(0, Known::Value(function)),
-            Some(Derived::Medium) if value(0).is_some() => {
+            Some(Derived::Medium | Derived::TableColor) if value(0).is_some() => {
                 value(0).map_or_else(Vec::new, |value| place(3, Known::Vanishes(value, function)))
             }
             _ => Vec::new(),

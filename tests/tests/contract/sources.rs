@@ -328,7 +328,7 @@ fn surfaces_stand_in_volumes() {
     }
 }
 
-/// Where the highest value is, and how far a sum reaches, is what `shade` is told.
+/// Where the ray enters, and how long it is inside, is what `shade` is told.
 #[test]
 fn shading_once_a_ray_knows_where() {
     let data = volume([3, 9, 3], ScalarType::F32, |p| 8.0 - (p.y - 3.0).abs());
@@ -343,17 +343,17 @@ fn shading_once_a_ray_knows_where() {
         picture(all, &Setup::post(0.25), &[Shape::around(&data, look)], &desc)[0]
     };
     let mean = (0..32).map(|k| 8.0 - (0.25 * (f64::from(k) + 0.5) - 3.0).abs()).sum::<f64>() / 32.0;
-    for (compositing, at, step, value) in [
-        (Compositing::Maximum, 3.0 - 0.125, 0.25, 8.0 - 0.125),
-        (Compositing::Minimum, 8.0 - 0.125, 0.25, 3.0 + 0.125),
-        (Compositing::Average, 0.0, 8.0, mean),
-        (Compositing::Add, 0.0, 8.0, mean * 8.0 / 16.0),
+    for (compositing, value) in [
+        (Compositing::Maximum, 8.0 - 0.125),
+        (Compositing::Minimum, 3.0 + 0.125),
+        (Compositing::Average, mean),
+        (Compositing::Add, mean * 8.0 / 16.0),
     ] {
         let all = with("where", compositing, &parameters, text);
         let [r, g, b, a] = shape(&all, compositing);
         let what = compositing.name();
-        within(&format!("{what}, place"), (r - at / 8.0).abs(), 1e-6);
-        within(&format!("{what}, step"), (g - 0.1 * step).abs(), 1e-6);
+        within(&format!("{what}, place"), r.abs(), 1e-6);
+        within(&format!("{what}, step"), (g - 0.1 * 8.0).abs(), 1e-6);
         within(&format!("{what}, value"), (b - 0.1 * value).abs(), 1e-6);
         assert_eq!(a, 1.0);
     }

@@ -170,6 +170,12 @@ impl Emptiness {
     pub fn any(&self) -> bool {
         self.distance.iter().any(|&d| d > 0)
     }
+
+    /// The share of blocks that can be skipped.
+    pub fn share(&self) -> f64 {
+        let blocks = self.blocks.iter().product::<usize>().max(1);
+        self.distance.iter().filter(|&&d| d > 0).count() as f64 / blocks as f64
+    }
 }
 
 /// Chebyshev distance transform by a forward and a backward sweep of 1 + minimum over the 26

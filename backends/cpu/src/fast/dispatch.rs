@@ -6,11 +6,11 @@ use volact_core::camera::LinearRays;
 use super::{
     fetch::{self, Access, Base, Fetch, Voxels},
     over::{self, Classes, Pixels},
-    packet::{Bundle, Cuts, Packet, Place, Span},
+    packet::{Bundle, Cuts, Lanes, Packet, Place, Span},
     preintegrate::SegmentPairs,
     reduce::{self, Reduced},
     shaded::{
-        self, Skip,
+        self, Skip, batch,
         field::{self, Field, Places},
         lookup::{self, Lookup},
     },
@@ -233,8 +233,20 @@ unsafe fn gradients_by<S: Simd>(of: &Field<'_>, p: Places<'_>, out: &mut [&mut [
 /// # Safety
 /// None of its own: it is unsafe so that it is called like the kernels.
 #[inline(always)]
-unsafe fn classified_by(table: &Lookup, values: &[f32], out: &mut [&mut [f32]], medium: bool) {
-    lookup::classified(table, values, out, medium);
+unsafe fn places_by(lines: &[[&Lanes; 2]; 3], rows: &[batch::Row], shift: f64, out: [&mut [f32]; 3]) {
+    batch::places(lines, rows, shift, out);
+}
+
+by_unit! {
+    /// The positions of rows of samples along lines, by axis.
+    places(lines: &[[&Lanes; 2]; 3], rows: &[batch::Row], shift: f64, out: [&mut [f32]; 3]),
+    => places_by(lines, rows, shift, out)
+}
+
+by_unit! {
+    /// Lays the media of rows behind what sixteen rays have seen.
+    composite(rows: &[batch::Row], medium: &[&[f32]; 4], seen: &mut [[f32; LANES]; 4], alphas: &mut [[f32; LANES]]),
+    S => shaded::composite::<S>(rows, medium, seen, alphas)
 }
 
 by_unit! {
@@ -252,12 +264,12 @@ by_unit! {
 by_unit! {
     /// What a table says of values.
     classified(table: &Lookup, values: &[f32], out: &mut [&mut [f32]], medium: bool),
-    => classified_by(table, values, out, medium)
+    S => lookup::classified::<S>(table, values, out, medium)
 }
 
 by_unit! {
     /// What lengths of sixteen media add: red, green, blue and extinction by lane.
-    absorb(medium: &[&[f32; LANES]; 4], length: f64, out: &mut Row),
+    absorb(medium: &[&[f32; LANES]; 4], length: f32, out: &mut Row),
     S => shaded::absorb::<S>(medium, length, out)
 }
 

@@ -81,6 +81,13 @@ impl Over<'_> {
             self.alone(job, only, pixels, counts);
             return met;
         }
+        if let ([(part, only)], None, false) = (aimed.as_slice(), &hits, sliced)
+            && let Content::Shaded(shaded) = &part.content
+        {
+            let ends = (self.termination, self.threshold);
+            shaded.alone(only.rays(bundle), &only.packets(), ends, pixels, counts);
+            return met;
+        }
         let hits = self.hits(bundle, &aimed, hits, counts);
         aimed.retain(|(part, _)| part.volume);
         match self.stretches(&aimed, &hits) {

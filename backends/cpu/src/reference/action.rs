@@ -10,7 +10,7 @@ use volact_core::{
 use super::{
     options::{Classification, Method, NAME, ReferenceOptions, declaration},
     picture::{ReferencePicture, integrate},
-    prepare::check,
+    prepare::check_with,
 };
 
 /// The certified reference.
@@ -43,7 +43,7 @@ impl ReferenceAction {
         frame.color = picture.color.iter().map(|c| c.map(|v| v as f32)).collect();
         frame.depth = picture.depth.iter().map(|d| *d as f32).collect();
         frame.warnings = shapes.iter().flat_map(|s| s.warnings.clone()).collect();
-        frame.method = self.method();
+        frame.method = self.method(!picture.estimated.is_empty());
         if self.options.method == Method::Exact {
             let report = certificate(picture, &self.options);
             log::info!("{NAME}: {report}");
@@ -57,14 +57,19 @@ impl ReferenceAction {
             ];
             frame.statistics.details.extend(figures.map(|(name, figure)| (name.to_owned(), figure)));
             frame.warnings.extend(not_certified(picture, &self.options));
+            if !picture.estimated.is_empty() {
+                frame.statistics.details.push(("estimated, not certified".into(), picture.estimated.join(", ")));
+                frame.warnings.extend(picture.estimated.iter().map(|name| estimated(name)));
+            }
         }
         frame
     }
 
-    fn method(&self) -> volact_core::Method {
+    fn method(&self, estimated: bool) -> volact_core::Method {
         let exact = self.options.method == Method::Exact;
         volact_core::Method {
             sampling: match self.options.method {
+                Method::Exact if estimated => "cell by cell; sources by adaptive quadrature",
                 Method::Exact => "cell by cell",
                 Method::Rays => "ray casting",
                 Method::Planes => "planes along the view axis",
@@ -72,6 +77,7 @@ impl ReferenceAction {
             .into(),
             sample_distance: if exact { 0.0 } else { self.options.sample_distance },
             classification: match self.options.classification {
+                _ if exact && estimated => "exact; of sources to an estimate",
                 _ if exact => "exact",
                 Classification::Post => "post-interpolated",
                 Classification::PreIntegrated => "pre-integrated",
@@ -100,6 +106,12 @@ fn certificate(picture: &ReferencePicture, options: &ReferenceOptions) -> String
     )
 }
 
+/// That a shape's part of the enclosures is no bound.
+fn estimated(shape: &str) -> Warning {
+    let message = "its shader is evaluated from its source: what it adds to the widths of enclosures is an estimate";
+    Warning::new(WarningCode::NotCertified, shape, message)
+}
+
 fn not_certified(picture: &ReferencePicture, options: &ReferenceOptions) -> Option<Warning> {
     let message = format!(
         "{} pixels have an enclosure wider than {:e}, the widest {:.1e}",
@@ -118,7 +130,7 @@ impl RenderAction for ReferenceAction {
         let values = [Compositing::Maximum, Compositing::Minimum, Compositing::Average, Compositing::Add];
         Caps {
             shaders: names(&["simple", "lut", "mip", "minip", "average", "xray", "attribute", "surface"]),
-            sources: false,
+            sources: true,
             geometries: None,
             compositing: [Compositing::Over, Compositing::First].into_iter().chain(values).collect(),
             overlap: true,
@@ -128,7 +140,7 @@ impl RenderAction for ReferenceAction {
     }
 
     fn manage(&mut self, shape: &Shape) -> Result<(), ActionError> {
-        self.lifecycle.manage(shape, check).map(|_| ())
+        self.lifecycle.manage(shape, |s| check_with(s, self.options.recognise)).map(|_| ())
     }
 
     fn unmanage(&mut self, shape: &Shape) -> Result<(), ActionError> {
@@ -137,7 +149,7 @@ impl RenderAction for ReferenceAction {
 
     fn begin_draw(&mut self, frame: &FrameDesc) -> Result<(), ActionError> {
         let started = Instant::now();
-        self.lifecycle.begin(frame, check)?;
+        self.lifecycle.begin(frame, |s| check_with(s, self.options.recognise))?;
         self.started = Some(started);
         Ok(())
     }

@@ -32,6 +32,14 @@ impl Hit {
         Self { light, alpha: [0.0, self.alpha[1]], ..self }
     }
 
+    /// Widens the lowest and highest number of all colours by its own.
+    pub fn widen(&self, range: &mut [f64; 2]) {
+        for [low, high] in self.light {
+            let most = if self.alpha[0] > 0.0 { high / self.alpha[0] } else { high };
+            *range = [range[0].min(low), range[1].max(if most.is_finite() { most } else { high })];
+        }
+    }
+
     /// Whether nothing behind it can be seen.
     pub fn is_opaque(&self) -> bool {
         self.alpha[0] == 1.0

@@ -42,6 +42,11 @@ impl Counting {
         Self { lattice: Lattice { step }, offset, scale: axis.dot(ray.direction) }
     }
 
+    /// World distance between the ends of segments, along the ray.
+    pub fn step(&self) -> f64 {
+        (self.lattice.step / self.scale).abs()
+    }
+
     /// The segments of a line with their ends in the line's own `t`, and their numbers.
     pub fn segments(&self, line: &Line) -> impl Iterator<Item = Segment> {
         self.segments_of(line.anchor, line.t)

@@ -52,17 +52,17 @@ pub(super) struct Medium {
 pub(super) type Corners = [[f64; 8]; 4];
 
 impl Medium {
-    /// Prepares a shape; `None` where its shader is not known here.
-    pub fn new(shape: &ResolvedShape) -> Option<Self> {
+    /// Prepares a shape as a shader of that name shows it; `None` where it is not known here.
+    pub fn new(shape: &ResolvedShape, shader: &str) -> Option<Self> {
         let unit = shape.float("unit_distance").unwrap_or(1.0);
         let component = usize::try_from(shape.int("component").unwrap_or(0)).unwrap_or(0);
         let mut made = Self { fields: Vec::new(), unit, table: None, component };
-        match shape.state.shader.as_str() {
+        match shader {
             "simple" => {
                 let texture = shape.volume("volume")?;
                 made.fields = simple(texture.meaning(), texture.range());
             }
-            shader @ ("lut" | "mip" | "minip" | "average" | "xray") => {
+            "lut" | "mip" | "minip" | "average" | "xray" => {
                 let range = shape.volume("volume")?.range();
                 let grey = LookupTable::grey(range);
                 let table = shape.table("lookup_table").unwrap_or(&grey);

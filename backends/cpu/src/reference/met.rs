@@ -19,7 +19,7 @@ use super::{
 
 /// Stretches of a mesh that are no further apart than this part of the distances on the ray are
 /// one to a lattice.
-const GAP: f64 = 1e-13;
+pub(super) const GAP: f64 = 1e-13;
 
 /// How a medium is looked at.
 #[derive(Clone, Copy, Debug)]
@@ -210,7 +210,7 @@ pub(super) fn along(shapes: &[Met<'_>], zero: f64, sampling: &Sampling, cutter: 
 
 /// The number of a place among those that are known already; a new one if it is not the same as
 /// any of them.
-fn number_of(known: &mut Vec<Mark>, mark: Mark) -> usize {
+pub(super) fn number_of(known: &mut Vec<Mark>, mark: Mark) -> usize {
     let same = |m: &Mark| m.compare(&mark).is_some_and(|order| order.is_eq());
     known.iter().position(same).unwrap_or_else(|| {
         known.push(mark);

@@ -13,6 +13,9 @@
 //! `lower` and `upper` of a [`ReferencePicture`] hold the true colour of every pixel. Maximum,
 //! minimum, mean and line integral come from the cubics' extremes and antiderivative.
 //!
+//! Shapes whose shader is a text are drawn by evaluating it: adaptively, with estimates in place
+//! of bounds (`source`).
+//!
 //! # What the certificate rests on
 //! - The scene is the f64 numbers that core hands over: rays, inverse transforms, maps to samples,
 //!   voxels after slope and intercept, control points. Their own making is not part of it.
@@ -29,7 +32,8 @@
 //! opaque; a value that touches an opaque plateau, a step or a peak of 1 without crossing it; media
 //! that turn opaque in one place within a cell, there or at a hit; a ray through a surface's
 //! silhouette, or through an edge between triangles of different shades. Depth is not enclosed. A
-//! lattice's enclosure is that of its sum, given its samples.
+//! lattice's enclosure is that of its sum, given its samples. What sources add to enclosures is an
+//! estimate, also in pixels that count as certified; frames with sources say so.
 //!
 //! # Beyond the contract's words
 //! Samples that are ±∞ make their cell infinite, which clamps in the table; where both signs meet
@@ -63,6 +67,7 @@ mod scene;
 mod series;
 mod sight;
 mod slices;
+mod source;
 mod surfaces;
 mod tetra;
 

@@ -41,6 +41,9 @@ pub struct ReferenceOptions {
     pub sample_distance: f64,
     /// The width of a pixel's enclosure, in any channel, up to which it counts as certified.
     pub tolerance: f64,
+    /// Whether shaders that come with Volact are drawn with a certificate, as sources, too; else they
+    /// are evaluated from their sources.
+    pub recognise: bool,
     /// Threads; 0 for as many as there are processors. The picture does not depend on it.
     pub threads: usize,
 }
@@ -52,6 +55,7 @@ impl Default for ReferenceOptions {
             classification: Classification::Post,
             sample_distance: 0.0,
             tolerance: 1e-9,
+            recognise: true,
             threads: 0,
         }
     }
@@ -84,6 +88,14 @@ pub fn declaration() -> Declaration {
             ParameterDecl::new("tolerance", ParameterType::Float, "width of an enclosure that counts as certified")
                 .bounds(0.0, 1.0)
                 .default(1e-9),
+        )
+        .with(
+            ParameterDecl::new(
+                "recognise",
+                ParameterType::Bool,
+                "draw sources that are built-in shaders as those, with a certificate; else evaluate every source",
+            )
+            .default(true),
         )
         .with(
             ParameterDecl::new("threads", ParameterType::Int, "threads; 0 for all processors")
@@ -125,6 +137,7 @@ impl ReferenceOptions {
             },
             sample_distance: step.unwrap_or(0.0),
             tolerance: number("tolerance").unwrap_or(default.tolerance),
+            recognise: options.get("recognise") != Some(&ParameterValue::Bool(false)),
             threads: number("threads").map_or(0, |n| n as usize),
         })
     }

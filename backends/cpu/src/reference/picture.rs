@@ -33,12 +33,16 @@ pub struct ReferencePicture {
     pub rays: u64,
     /// Stretches integrated, cells gathered, or samples taken.
     pub samples: u64,
+    /// The shapes whose shader was evaluated from its source. Unless on a lattice, what they add to
+    /// the width of enclosures is an estimate and no bound.
+    pub estimated: Vec<String>,
 }
 
 /// Integrates a picture of shapes, in the order in which they were drawn.
 ///
 /// # Errors
-/// If the frame cannot be, a shape is refused by [`check`](super::check), or a lattice is too fine.
+/// If the frame cannot be, a shape is refused by [`check`](super::check), a lattice is too fine, or a
+/// shader's program fails on a sample.
 pub fn integrate(
     shapes: &[ResolvedShape],
     frame: &FrameDesc,
@@ -46,7 +50,9 @@ pub fn integrate(
 ) -> Result<ReferencePicture, ActionError> {
     frame.validate()?;
     let scene = Scene::new(shapes, frame, options)?;
-    Ok(gather(scene.rows(), frame, frame.viewport(), options))
+    let picture = gather(scene.rows(), frame, frame.viewport(), options);
+    scene.check()?;
+    Ok(ReferencePicture { estimated: scene.estimated(), ..picture })
 }
 
 fn gather(
@@ -68,6 +74,7 @@ fn gather(
         widest: 0.0,
         rays: 0,
         samples: 0,
+        estimated: Vec::new(),
     };
     for (y, row) in rows.into_iter().enumerate() {
         for (x, Pixel { light, samples, met }) in row.into_iter().enumerate() {

@@ -14,6 +14,7 @@ use super::{
     medium::{Medium, Voxels},
     mesh::Mesh,
     options::{Method, NAME, ReferenceOptions},
+    source::{self, Look},
     surfaces,
 };
 
@@ -22,6 +23,8 @@ pub(super) struct Prepared {
     /// What identifies the shape: overlapping shapes are put in this order, so that the order of
     /// drawing changes no bit.
     pub id: u64,
+    /// Its number among all that are drawn.
+    pub order: usize,
     pub medium: Medium,
     pub body: Body,
     /// World to object.
@@ -59,19 +62,31 @@ pub(super) struct GridBody {
 /// The most samples along the diagonal of a shape.
 const MAX_SAMPLES: f64 = 1e9;
 
+/// Refuses what cannot be drawn with the option `recognise` on.
+///
+/// # Errors
+/// If the geometry is damaged or holds no volume, the shader is not known here and has no source,
+/// reads a component that is not there, or an attribute does not go with the vertices.
+pub fn check(shape: &ResolvedShape) -> Result<(), ActionError> {
+    check_with(shape, true)
+}
+
 /// Refuses what cannot be drawn.
 ///
 /// # Errors
-/// If the geometry is damaged or holds no volume, the shader is not known here, reads a component
-/// that is not there, or an attribute does not go with the vertices.
-pub fn check(shape: &ResolvedShape) -> Result<(), ActionError> {
+/// As [`check`].
+pub(super) fn check_with(shape: &ResolvedShape, recognise: bool) -> Result<(), ActionError> {
+    match source::look(shape, recognise)? {
+        Look::Surface => surfaces::check(shape),
+        Look::Source(program) => source::check(shape, &program),
+        Look::Native(shader) => check_native(shape, shader),
+    }
+}
+
+fn check_native(shape: &ResolvedShape, shader: &str) -> Result<(), ActionError> {
     let refuse = |what: String, cure: &str| {
         Err(ActionError::Unsupported { action: NAME.into(), shape: shape.name.clone(), what, cure: cure.into() })
     };
-    let shader = &shape.state.shader;
-    if surfaces::is_surface(shape) {
-        return surfaces::check(shape);
-    }
     if shape.state.geometry.slices().is_some() && shape.compositing() != Compositing::Over {
         return refuse(format!("slices with the shader {shader:?}"), "use simple, lut or attribute");
     }
@@ -90,7 +105,7 @@ pub fn check(shape: &ResolvedShape) -> Result<(), ActionError> {
     if shape.attribute("scalars").is_some() && shape.state.geometry.vertex_count().is_none() {
         check_attributes(shape, &tessellate(shape)?)?;
     }
-    match Medium::new(shape) {
+    match Medium::new(shape, shader) {
         Some(_) => Ok(()),
         None => {
             let cure = "use simple, lut, mip, minip, average, xray or attribute";
@@ -100,46 +115,62 @@ pub fn check(shape: &ResolvedShape) -> Result<(), ActionError> {
 }
 
 /// A shape's tetrahedra, checked.
-fn tessellate(shape: &ResolvedShape) -> Result<Tessellation, ActionError> {
+pub(super) fn tessellate(shape: &ResolvedShape) -> Result<Tessellation, ActionError> {
     let geometry = &shape.state.geometry;
     let made = geometry.tessellate().and_then(|made| made.validate(geometry.name()).map(|()| made));
     made.map_err(|source| ActionError::Geometry { shape: shape.name.clone(), source })
 }
 
 /// Refuses attributes that have not a number for each vertex.
-fn check_attributes(shape: &ResolvedShape, made: &Tessellation) -> Result<(), ActionError> {
+pub(super) fn check_attributes(shape: &ResolvedShape, made: &Tessellation) -> Result<(), ActionError> {
     let wanted = shape.state.geometry.vertex_count().unwrap_or(made.vertices.len());
-    for name in ["scalars", "opacity_scalars"] {
+    for name in shape.parameters.keys() {
         let Some(attribute) = shape.attribute(name).filter(|a| a.len() != wanted) else { continue };
         let kind = ProblemKind::Mistyped {
             found: format!("attribute {:?} of {} vertices", attribute.name, attribute.len()),
             wanted: format!("one of {wanted}, the geometry's"),
         };
-        let problems = vec![ParameterProblem { name: name.into(), kind }];
+        let problems = vec![ParameterProblem { name: name.clone(), kind }];
         let (shape, shader) = (shape.name.clone(), shape.state.shader.clone());
         return Err(ActionError::Parameters { shape, shader, problems });
     }
     Ok(())
 }
 
-/// Makes shapes other than surfaces ready, in the order in which they are drawn. [`check`] has let
-/// them pass.
+/// Shapes made ready, each kind in the order in which they are drawn.
+#[derive(Default)]
+pub(super) struct Ready {
+    pub shapes: Vec<Prepared>,
+    pub sources: Vec<source::Prepared>,
+}
+
+/// Makes shapes other than surfaces ready. [`check_with`] has let them pass.
 ///
 /// # Errors
-/// If a geometry cannot be tessellated, or a lattice is too fine.
-pub(super) fn prepare(shapes: &[ResolvedShape], options: &ReferenceOptions) -> Result<Vec<Prepared>, ActionError> {
-    let mut prepared: Vec<Prepared> = Vec::new();
-    for shape in shapes.iter().filter(|s| !surfaces::is_surface(s)) {
-        let Some(medium) = Medium::new(shape) else { continue };
-        let compositing = shape.compositing();
-        let exact = options.method == Method::Exact;
-        if !exact {
+/// If a geometry cannot be tessellated, a program cannot be compiled, or a lattice is too fine.
+pub(super) fn prepare(shapes: &[ResolvedShape], options: &ReferenceOptions) -> Result<Ready, ActionError> {
+    let mut ready = Ready::default();
+    let exact = options.method == Method::Exact;
+    for (order, shape) in shapes.iter().enumerate() {
+        let look = source::look(shape, options.recognise)?;
+        if !exact && !matches!(look, Look::Surface) {
             check_samples(shape, options.sample_distance)?;
         }
+        let shader = match look {
+            Look::Surface => continue,
+            Look::Native(shader) => shader,
+            Look::Source(program) => {
+                ready.sources.extend(source::prepare(shape, program, order)?);
+                continue;
+            }
+        };
+        let Some(medium) = Medium::new(shape, shader) else { continue };
+        let compositing = shape.compositing();
         let skip = exact && compositing == Compositing::Over;
         let Some((body, center)) = body(shape, &medium, skip)? else { continue };
-        prepared.push(Prepared {
+        ready.shapes.push(Prepared {
             id: shape.id,
+            order,
             brightest: medium.brightest(),
             max_opacity: medium.max_opacity(),
             medium,
@@ -151,7 +182,7 @@ pub(super) fn prepare(shapes: &[ResolvedShape], options: &ReferenceOptions) -> R
             slices: shape.state.geometry.slices().cloned(),
         });
     }
-    Ok(prepared)
+    Ok(ready)
 }
 
 /// What holds a shape's fields, and its middle; `None` where it holds nothing.

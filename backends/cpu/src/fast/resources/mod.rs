@@ -65,6 +65,9 @@ pub struct Resources {
     vacant: BTreeMap<u64, Vacant>,
 }
 
+/// The share of empty blocks from which on they are looked at by programs.
+const WORTH: f64 = 0.05;
+
 /// Where a program is transparent.
 #[derive(Debug)]
 struct Vacant {
@@ -384,7 +387,8 @@ impl Resources {
             }
         };
         let empty = bounds.emptiness(tables::opaque(&table.resolve(texture.range()), units));
-        let empty = Some(empty).filter(Emptiness::any);
+        // Looking where to skip costs more than a few samples.
+        let empty = Some(empty).filter(|empty| empty.share() > WORTH);
         if let Some(empty) = &empty {
             say("occupancy", empty.bytes());
         }

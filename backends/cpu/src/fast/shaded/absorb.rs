@@ -1,13 +1,15 @@
 //! From extinction to the opacity of a length, sixteen at once.
-#![expect(unsafe_code, reason = "a kernel of a vector unit")]
+#![expect(unsafe_code, reason = "kernels of a vector unit")]
+#![expect(clippy::needless_range_loop, reason = "a number indexes several arrays")]
 
+use super::{batch, field::sixteen};
 use crate::fast::{
     simd::{LANES, Simd},
     sweep::gather::Row,
 };
 
-/// Premultiplied colour and opacity of a `length` of sixteen media: red, green, blue and
-/// extinction by lane. Nothing where any of it is NaN, or the extinction not positive.
+/// Opacities of lengths of sixteen media, and in which lanes there is something: nowhere that a
+/// number is NaN, or the extinction not positive.
 ///
 /// α = 1 − e^(−σ·length), as −2ⁿ·(e^r − 1) − (2ⁿ − 1) with −σ·length = n·ln 2 + r, so that small
 /// opacities keep their digits; e^r − 1 by Taylor's series to r⁷, to 1e-8 for |r| ≤ ln 2 / 2.
@@ -15,20 +17,16 @@ use crate::fast::{
 /// # Safety
 /// Called from a function compiled for `S` on a machine that has it.
 #[inline(always)]
-pub unsafe fn absorb<S: Simd>(medium: &[&[f32; LANES]; 4], length: f64, out: &mut Row) {
+unsafe fn opacity<S: Simd>([r, g, b, sigma]: [S::F; 4], length: S::F) -> (S::F, u32) {
     // SAFETY: the caller's promise.
     unsafe {
-        let [r, g, b, sigma] = medium.map(|row| S::load(row));
-        let unknown = S::nan_bits(S::add(S::add(r, g), S::add(b, sigma)));
+        let zero = S::splat(0.0);
         // `inf − inf` is NaN, too, but colours are not infinite where they can be seen.
-        let depth = S::mul(sigma, S::splat(length as f32));
-        let seen = S::lt_bits(S::splat(0.0), depth) & !unknown;
-        if seen == 0 {
-            *out = [[0.0; 4]; LANES];
-            return;
-        }
+        let unknown = S::nan_bits(S::add(S::add(r, g), S::add(b, sigma)));
+        let depth = S::mul(sigma, length);
+        let seen = S::lt_bits(zero, depth) & !unknown;
         // Beyond, nothing is left in f32.
-        let y = S::sub(S::splat(0.0), S::min(depth, S::splat(80.0)));
+        let y = S::sub(zero, S::min(depth, S::splat(80.0)));
         let n = S::floor(S::fma(y, S::splat(std::f32::consts::LOG2_E), S::splat(0.5)));
         let rest = S::fma(n, S::splat(-0.693_359_4), y);
         let rest = S::fma(n, S::splat(2.121_944_4e-4), rest);
@@ -39,14 +37,69 @@ pub unsafe fn absorb<S: Simd>(medium: &[&[f32; LANES]; 4], length: f64, out: &mu
         let less = S::fma(S::mul(rest, rest), series, rest);
         let power = S::as_float(S::shl::<23>(S::add_int(S::to_int(n), S::splat_int(127))));
         let alpha = S::sub(S::sub(S::splat(1.0), power), S::mul(power, less));
-        let alpha = S::select(seen, alpha, S::splat(0.0));
+        (S::select(seen, alpha, zero), seen)
+    }
+}
+
+/// Premultiplied colour and opacity of a `length` of sixteen media: red, green, blue and
+/// extinction by lane.
+///
+/// # Safety
+/// Called from a function compiled for `S` on a machine that has it.
+#[inline(always)]
+pub unsafe fn absorb<S: Simd>(medium: &[&[f32; LANES]; 4], length: f32, out: &mut Row) {
+    // SAFETY: the caller's promise.
+    unsafe {
+        let medium = [S::load(medium[0]), S::load(medium[1]), S::load(medium[2]), S::load(medium[3])];
+        let (alpha, seen) = opacity::<S>(medium, S::splat(length));
+        if seen == 0 {
+            *out = [[0.0; 4]; LANES];
+            return;
+        }
         let mut rows = [[0f32; LANES]; 4];
-        for (row, c) in rows.iter_mut().zip([r, g, b]) {
-            S::store(S::select(seen, S::mul(c, alpha), S::splat(0.0)), row);
+        for c in 0..3 {
+            S::store(S::select(seen, S::mul(medium[c], alpha), S::splat(0.0)), &mut rows[c]);
         }
         S::store(alpha, &mut rows[3]);
         for (l, entry) in out.iter_mut().enumerate() {
             *entry = [rows[0][l], rows[1][l], rows[2][l], rows[3][l]];
+        }
+    }
+}
+
+/// Lays rows of media, front to back, behind what sixteen rays have seen: premultiplied colour and
+/// opacity by number and lane. `alphas` takes the rows' opacities.
+///
+/// # Safety
+/// Called from a function compiled for `S` on a machine that has it.
+#[inline(always)]
+pub unsafe fn composite<S: Simd>(
+    rows: &[batch::Row],
+    medium: &[&[f32]; 4],
+    seen: &mut [[f32; LANES]; 4],
+    alphas: &mut [[f32; LANES]],
+) {
+    // SAFETY: the caller's promise.
+    unsafe {
+        let (zero, one) = (S::splat(0.0), S::splat(1.0));
+        let mut sum = [S::load(&seen[0]), S::load(&seen[1]), S::load(&seen[2]), S::load(&seen[3])];
+        for (i, (row, kept)) in rows.iter().zip(alphas).enumerate() {
+            let mut numbers = [zero; 4];
+            for c in 0..4 {
+                numbers[c] = S::load(sixteen(medium[c], i * LANES));
+            }
+            let (alpha, some) = opacity::<S>(numbers, S::load(&row.length));
+            let some = some & row.live;
+            let alpha = S::select(some, alpha, zero);
+            S::store(alpha, kept);
+            let weight = S::mul(S::sub(one, sum[3]), alpha);
+            for c in 0..3 {
+                sum[c] = S::fma(weight, S::select(some, numbers[c], zero), sum[c]);
+            }
+            sum[3] = S::add(sum[3], weight);
+        }
+        for c in 0..4 {
+            S::store(sum[c], &mut seen[c]);
         }
     }
 }
@@ -61,12 +114,12 @@ mod tests {
         let depths = [0.0, 1e-30, 1e-7, 1e-4, 0.01, 0.2, 0.34, 0.35, 0.69, 0.7, 1.0, 3.0, 16.0, 90.0, 1e30, f32::INFINITY];
         for unit in [Unit::Plain, Unit::Avx2, Unit::Avx512].into_iter().filter(|u| u.available()) {
             for length in [1.0, 0.37, 1e4] {
-                let sigma = depths.map(|d| (f64::from(d) / length) as f32);
+                let sigma = depths.map(|d| d / length);
                 let colors = [[0.5; LANES], [1.0; LANES], [0.0; LANES]];
                 let mut out = [[0.0; 4]; LANES];
                 dispatch::absorb(unit, &[&colors[0], &colors[1], &colors[2], &sigma], length, &mut out);
                 for (found, sigma) in out.iter().zip(sigma) {
-                    let wanted = -(-f64::from(sigma) * length).exp_m1();
+                    let wanted = -(-f64::from(sigma) * f64::from(length)).exp_m1();
                     let error = (f64::from(found[3]) - wanted).abs();
                     assert!(error <= 3e-7 * wanted, "{unit:?}: {sigma} over {length}: {}, wanted {wanted}", found[3]);
                     assert_eq!((found[0], found[1], found[2]), (0.5 * found[3], found[3], 0.0));

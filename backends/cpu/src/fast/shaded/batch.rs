@@ -1,4 +1,5 @@
 //! A function of a shader over batches of samples of sixteen rays.
+#![expect(clippy::needless_range_loop, reason = "a lane indexes several arrays")]
 
 use std::sync::{Mutex, OnceLock, PoisonError};
 
@@ -14,8 +15,10 @@ use volact_shaders::{
 
 use super::{Shader, surroundings::Surroundings, trail::Trail};
 use crate::fast::{
-    packet::{Bundle, Lanes, Vectors},
+    dispatch,
+    packet::{Bundle, Lanes},
     simd::{LANES, Unit},
+    walk::ALL,
 };
 
 /// Rows of sixteen samples in a batch.
@@ -31,14 +34,14 @@ pub struct Row {
     /// Where they are on their rays.
     pub t: Lanes,
     /// World lengths that they stand for.
-    pub length: Lanes,
+    pub length: [f32; LANES],
     /// What the compositing made of values.
     pub value: [f32; LANES],
 }
 
 impl Row {
     /// Samples at `t` for lengths, in some lanes.
-    pub fn new(number: usize, live: u32, t: Lanes, length: Lanes) -> Self {
+    pub fn new(number: usize, live: u32, t: Lanes, length: [f32; LANES]) -> Self {
         Self { number, live, t, length, value: [0.0; LANES] }
     }
 
@@ -72,6 +75,7 @@ pub struct Evaluator<'a> {
     component: usize,
     /// Whether it is a function of both ends of a segment.
     of_segments: bool,
+    unit: Unit,
     /// Those that no thread uses at the moment.
     workers: Mutex<Vec<Worker<'a>>>,
     failed: OnceLock<Overrun>,
@@ -116,6 +120,7 @@ impl<'a> Evaluator<'a> {
             attributes: parameters.iter().map(|p| attribute(&p.name)).collect(),
             component: super::component(shape),
             of_segments: entry == Entry::Segment,
+            unit,
             workers: Mutex::default(),
             failed: OnceLock::new(),
         }
@@ -155,13 +160,29 @@ impl<'a> Evaluator<'a> {
             return false;
         }
         let local = rays.bundle.local(self.origin);
-        for (input, numbers) in self.inputs.iter().zip(inputs.iter_mut()) {
-            numbers.clear();
+        for numbers in inputs.iter_mut() {
             numbers.resize(rows.len() * LANES, 0.0);
-            for (row, to) in rows.iter().zip(numbers.as_chunks_mut().0) {
-                self.numbers(*input, rays, &local, row, to);
-            }
         }
+        let lines = std::array::from_fn(|a| [&local[a], &rays.bundle.direction[a]]);
+        // Positions come as three inputs in a row, or fewer where some are not wanted.
+        let mut at = 0;
+        while let Some(input) = self.inputs.get(at) {
+            let shift = self.shift(*input);
+            let position = |n: usize| matches!(self.inputs.get(at + n), Some(Input { field: Field::Position(a), sample })
+                if *sample == input.sample && usize::from(*a) == n);
+            if position(0) && position(1) && position(2) {
+                if let [x, y, z, ..] = &mut inputs[at..] {
+                    dispatch::places(self.unit, &lines, rows, shift, [x, y, z]);
+                }
+                at += 3;
+                continue;
+            }
+            for (row, to) in rows.iter().zip(inputs[at].as_chunks_mut().0) {
+                self.numbers(*input, rays, shift, row, to);
+            }
+            at += 1;
+        }
+        self.idle(rows, inputs);
         maps.clear();
         if let Some(trail) = rays.trail.filter(|trail| trail.is_bent()) {
             for row in rows.iter() {
@@ -183,30 +204,43 @@ impl<'a> Evaluator<'a> {
         result.map_err(|overrun| self.failed.set(overrun)).is_ok()
     }
 
-    /// A number of a row of samples, in local space.
-    #[inline(always)]
-    fn numbers(&self, input: Input, rays: Rays<'_>, local: &Vectors, row: &Row, to: &mut [f32; LANES]) {
-        let mut t = row.t;
-        if self.of_segments {
-            let end = if input.sample == 0 { -0.5 } else { 0.5 };
-            t.iter_mut().zip(row.length).for_each(|(t, length)| *t += end * length);
+    /// Where an input is taken, from the middle of a segment on, in its lengths: functions of
+    /// segments take both ends.
+    fn shift(&self, input: Input) -> f64 {
+        match (self.of_segments, input.sample) {
+            (false, _) => 0.0,
+            (true, 0) => -0.5,
+            (true, _) => 0.5,
         }
+    }
+
+    /// Puts idle lanes where a live one is.
+    fn idle(&self, rows: &[Row], inputs: &mut [Vec<f32>]) {
+        for (i, row) in rows.iter().enumerate().filter(|(_, row)| row.live != ALL) {
+            let lanes = row.lanes();
+            for to in inputs.iter_mut().filter_map(|numbers| numbers.as_chunks_mut::<LANES>().0.get_mut(i)) {
+                let numbers = *to;
+                *to = lanes.map(|l| numbers[l]);
+            }
+        }
+    }
+
+    /// A number of a row of samples.
+    fn numbers(&self, input: Input, rays: Rays<'_>, shift: f64, row: &Row, to: &mut [f32; LANES]) {
+        let at = |l: usize| row.t[l] + shift * f64::from(row.length[l]);
         match input.field {
             Field::Position(a) => {
-                let (from, along) = (&local[usize::from(a)], &rays.bundle.direction[usize::from(a)]);
-                (0..LANES).for_each(|l| to[l] = (from[l] + along[l] * t[l]) as f32);
+                let (a, eye) = (usize::from(a), self.origin[usize::from(a)]);
+                let (from, along) = (&rays.bundle.origin[a], &rays.bundle.direction[a]);
+                (0..LANES).for_each(|l| to[l] = (from[l] - eye + along[l] * at(l)) as f32);
             }
             Field::Direction(a) => *to = rays.bundle.direction[usize::from(a)].map(|d| d as f32),
             Field::View(a) => *to = rays.bundle.direction[usize::from(a)].map(|d| -d as f32),
-            Field::Step => *to = row.length.map(|length| length as f32),
-            Field::Depth => *to = t.map(|t| (t - rays.bundle.depth_zero) as f32),
+            Field::Step => *to = row.length,
+            Field::Depth => (0..LANES).for_each(|l| to[l] = (at(l) - rays.bundle.depth_zero) as f32),
             Field::Value => *to = row.value,
-            Field::Attribute(p) => self.attribute(rays, (p, self.component), &t, row, to),
-            Field::AttributeComponent(p, c) => self.attribute(rays, (p, usize::from(c)), &t, row, to),
-        }
-        if row.live != crate::fast::walk::ALL {
-            let numbers = *to;
-            *to = row.lanes().map(|l| numbers[l]);
+            Field::Attribute(p) => self.attribute(rays, (p, self.component), &at, row, to),
+            Field::AttributeComponent(p, c) => self.attribute(rays, (p, usize::from(c)), &at, row, to),
         }
     }
 
@@ -214,14 +248,39 @@ impl<'a> Evaluator<'a> {
         &self,
         rays: Rays<'_>,
         (parameter, component): (usize, usize),
-        t: &Lanes,
+        at: &dyn Fn(usize) -> f64,
         row: &Row,
         to: &mut [f32; LANES],
     ) {
         let attribute = self.attributes.get(parameter).copied().flatten().filter(|a| component < a.components);
         let (Some(attribute), Some(trail)) = (attribute, rays.trail) else { return to.fill(0.0) };
         for l in (0..LANES).filter(|l| row.live >> l & 1 == 1) {
-            to[l] = trail.number(l, t[l], |vertex| attribute.value(vertex, component)) as f32;
+            to[l] = trail.number(l, at(l), |vertex| attribute.value(vertex, component)) as f32;
         }
+    }
+}
+
+/// The positions of rows of samples: `from + along·t`, as far as `shift` of their lengths from their
+/// middle.
+#[inline(always)]
+pub fn places(lines: &[[&Lanes; 2]; 3], rows: &[Row], shift: f64, out: [&mut [f32]; 3]) {
+    let [x, y, z] = out;
+    let out = x.as_chunks_mut::<LANES>().0.iter_mut().zip(y.as_chunks_mut::<LANES>().0).zip(z.as_chunks_mut::<LANES>().0);
+    let lines = lines.map(|[from, along]| [*from, *along]);
+    for (row, ((x, y), z)) in rows.iter().zip(out) {
+        let mut t = row.t;
+        if shift != 0.0 {
+            for l in 0..LANES {
+                t[l] += shift * f64::from(row.length[l]);
+            }
+        }
+        // In places of its own, so that the compiler makes vectors of it.
+        let mut at = [[0f32; LANES]; 3];
+        for a in 0..3 {
+            for l in 0..LANES {
+                at[a][l] = (lines[a][0][l] + lines[a][1][l] * t[l]) as f32;
+            }
+        }
+        (*x, *y, *z) = (at[0], at[1], at[2]);
     }
 }

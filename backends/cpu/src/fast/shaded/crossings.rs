@@ -161,7 +161,7 @@ impl<'a> Crossings<'a> {
                 if worker.rows.len() == ROWS {
                     self.read(rays, worker, last, &mut brackets, counts);
                 }
-                worker.rows.push(Row::new(0, lanes, t, [self.step; LANES]));
+                worker.rows.push(Row::new(0, lanes, t, [self.step as f32; LANES]));
             }
         }
         self.read(rays, worker, last, &mut brackets, counts);
@@ -223,7 +223,7 @@ impl<'a> Crossings<'a> {
         each_of_lanes(&places, |p| p.0, |some| {
             self.shade.with(|worker| {
                 worker.rows.extend(some.iter().map(|lanes| {
-                    let (mut row, mut at) = (Row::new(0, 0, [0.0; LANES], [self.step; LANES]), [0.0; LANES]);
+                    let (mut row, mut at) = (Row::new(0, 0, [0.0; LANES], [self.step as f32; LANES]), [0.0; LANES]);
                     for &&(l, t, level) in lanes {
                         (row.live, at[l], row.value[l]) = (row.live | 1 << l, t, level as f32);
                     }
@@ -254,7 +254,7 @@ impl<'a> Crossings<'a> {
         each_of_lanes(&guesses, |g| g.1, |some| {
             self.value.with(|worker| {
                 worker.rows.extend(some.iter().map(|lanes| {
-                    let (mut row, mut at) = (Row::new(0, 0, [0.0; LANES], [self.step; LANES]), [0.0; LANES]);
+                    let (mut row, mut at) = (Row::new(0, 0, [0.0; LANES], [self.step as f32; LANES]), [0.0; LANES]);
                     lanes.iter().for_each(|&&(_, l, t)| (row.live, at[l]) = (row.live | 1 << l, t));
                     row.t = at;
                     row

@@ -11,6 +11,7 @@ use super::{
 };
 use crate::fast::{
     dispatch,
+    over::{Pixels, part_of},
     packet::{Cuts, Lanes, Packet},
     simd::{LANES, Unit},
     sweep::{
@@ -18,7 +19,7 @@ use crate::fast::{
         gather::{self, Chunk},
         piece::Hit,
     },
-    walk::{CHUNK, Counts},
+    walk::{ALL, CHUNK, Counts},
 };
 
 /// A shape's segments as its program shows them.
@@ -62,13 +63,13 @@ impl<'a> Dense<'a> {
     pub fn planes(&self, rays: Rays<'_>, (t, live): (Lanes, u32), opaque: bool, hits: &mut [Vec<Hit>; LANES]) {
         let at = self.place.as_ref().unwrap_or(&self.medium);
         at.with(|worker| {
-            worker.rows.push(Row::new(0, live, t, [self.thickness; LANES]));
+            worker.rows.push(Row::new(0, live, t, [self.thickness as f32; LANES]));
             if !at.run(rays, worker) {
                 return;
             }
             let medium = [0, 1, 2, 3].map(|i| sixteen(worker.output(i), 0));
             let mut entries = [[0f32; 4]; LANES];
-            dispatch::absorb(self.unit, &medium, self.thickness, &mut entries);
+            dispatch::absorb(self.unit, &medium, self.thickness as f32, &mut entries);
             for l in (0..LANES).filter(|l| live >> l & 1 == 1) {
                 // Opaque planes have the medium's colour, and their own opacity.
                 let [r, g, b, extinction] = medium.map(|row| row[l]);
@@ -87,13 +88,134 @@ impl<'a> Dense<'a> {
         for (i, row) in worker.rows.iter().enumerate() {
             let medium = [0, 1, 2, 3].map(|c| sixteen(worker.output(c), i * LANES));
             let mut entries = [[0f32; 4]; LANES];
-            dispatch::absorb(self.unit, &medium, self.step, &mut entries);
+            dispatch::absorb(self.unit, &medium, self.step as f32, &mut entries);
             for l in (0..LANES).filter(|l| row.live >> l & 1 == 0) {
                 entries[l] = [0.0; 4];
             }
             take(row, &entries);
         }
     }
+
+    /// The rows of the chunk that begins with segment `first` in which there may be something;
+    /// returns the next segment in which there may be.
+    fn rows(&self, at: (&Packet, &Cuts), first: i64, done: u32, mut add: impl FnMut(Row)) -> i64 {
+        let length = [self.step as f32; LANES];
+        let mut add = |row: usize, live: u32| {
+            let t = ((first + row as i64) as f64 + 0.5) * self.step;
+            add(Row::new(row, live, [t; LANES], length));
+        };
+        if let Some(skip) = &self.skip {
+            return skip.rows(at, (self.step, first), done, add);
+        }
+        let (cuts, end) = (at.1, first + CHUNK as i64);
+        let place = |k: f64| (k as i64 - first).clamp(0, CHUNK as i64) as usize;
+        let (from, to) = (cuts.from.map(place), cuts.to.map(place));
+        for row in 0..CHUNK {
+            let live = (0..LANES).fold(0, |live, l| live | u32::from(from[l] <= row && row < to[l]) << l) & !done;
+            if live != 0 {
+                add(row, live);
+            }
+        }
+        let more = (0..LANES).any(|l| cuts.from[l] < cuts.to[l] && cuts.to[l] as i64 > end);
+        if more { end } else { i64::MAX }
+    }
+
+    /// Draws rays on stretches where nothing else is, behind what they have seen.
+    pub fn alone(
+        &self,
+        rays: Rays<'_>,
+        stretches: &[Packet],
+        (termination, threshold): (f32, f32),
+        pixels: &mut Pixels,
+        counts: &mut Counts,
+    ) {
+        let seen = [0, 1, 2, 3].map(|c| pixels.color.map(|color| color[c]));
+        let mut sight = Sight { seen, depth: pixels.depth, threshold };
+        let done = |sight: &Sight| (0..LANES).fold(0, |d, l| d | u32::from(1.0 - sight.seen[3][l] < termination) << l);
+        self.medium.with(|worker| {
+            for packet in stretches {
+                let cuts = packet.split(self.step);
+                counts.lattice += cuts.count();
+                self.cut(&cuts.front, done(&sight), worker, counts);
+                let [first, last] = cuts.whole().unwrap_or([0, 0]);
+                let mut next = first;
+                while next < last {
+                    let chunk = next.div_euclid(CHUNK as i64) * CHUNK as i64;
+                    let mut more = 0;
+                    next = self.rows((packet, &cuts), chunk, done(&sight), |row| {
+                        more += u64::from(row.live.count_ones());
+                        if worker.rows.len() == ROWS {
+                            self.lay(rays, worker, &mut sight);
+                        }
+                        worker.rows.push(row);
+                    });
+                    counts.samples += more;
+                    self.lay(rays, worker, &mut sight);
+                    if done(&sight) & ALL == ALL {
+                        break;
+                    }
+                }
+                self.cut(&cuts.back, done(&sight), worker, counts);
+                self.lay(rays, worker, &mut sight);
+            }
+        });
+        for (l, color) in pixels.color.iter_mut().enumerate() {
+            *color = sight.seen.map(|row| row[l]);
+        }
+        pixels.depth = sight.depth;
+    }
+
+    /// Takes a cut segment of each ray that is not done.
+    fn cut(&self, cut: &[[f64; 2]; LANES], done: u32, worker: &mut Worker<'a>, counts: &mut Counts) {
+        let live = (0..LANES).fold(0, |live, l| live | u32::from(cut[l][0] < cut[l][1]) << l) & !done;
+        if live != 0 {
+            counts.lattice += u64::from(live.count_ones());
+            counts.samples += u64::from(live.count_ones());
+            let (middle, length) = (cut.map(|[a, b]| 0.5 * (a + b)), cut.map(|[a, b]| (b - a) as f32));
+            worker.rows.push(Row::new(0, live, middle, length));
+        }
+    }
+
+    /// Lays a worker's rows behind what was seen.
+    fn lay(&self, rays: Rays<'_>, worker: &mut Worker<'a>, sight: &mut Sight) {
+        if self.medium.run(rays, worker) {
+            let medium = [0, 1, 2, 3].map(|c| worker.output(c));
+            let (mut alphas, before) = ([[0f32; LANES]; ROWS], sight.seen[3]);
+            dispatch::composite(self.unit, &worker.rows, &medium, &mut sight.seen, &mut alphas);
+            let rows = worker.rows.iter().zip(&alphas);
+            for l in (0..LANES).filter(|l| before[*l] < sight.threshold && sight.seen[3][*l] >= sight.threshold) {
+                sight.depth[l] = reached(l, before[l], sight.threshold, rows.clone());
+            }
+        }
+        worker.rows.clear();
+    }
+}
+
+/// What sixteen rays have seen, by number and lane.
+struct Sight {
+    seen: [[f32; LANES]; 4],
+    depth: Lanes,
+    threshold: f32,
+}
+
+/// Where a lane reached the threshold among rows; at the end of the last one where rounding tells
+/// otherwise.
+fn reached<'r>(
+    l: usize,
+    mut opacity: f32,
+    threshold: f32,
+    rows: impl Iterator<Item = (&'r Row, &'r [f32; LANES])>,
+) -> f64 {
+    let mut end = f64::INFINITY;
+    for (row, alpha) in rows.filter(|(row, _)| row.live >> l & 1 == 1) {
+        let (length, after) = (f64::from(row.length[l]), opacity + (1.0 - opacity) * alpha[l]);
+        let start = row.t[l] - 0.5 * length;
+        if after >= threshold {
+            return start + f64::from(part_of(opacity, alpha[l], threshold)) * length;
+        }
+        (opacity, end) = (after, start + length);
+    }
+    end
 }
 
 impl Batches for Dense<'_> {
@@ -104,52 +226,29 @@ impl Batches for Dense<'_> {
         done: u32,
         counts: &mut Counts,
     ) -> (gather::Row, u32) {
-        let live = (0..LANES).fold(0, |live, l| live | u32::from(cut[l][0] < cut[l][1]) << l) & !done;
-        let mut found = [[0f32; 4]; LANES];
-        if live != 0 {
-            counts.lattice += u64::from(live.count_ones());
-            counts.samples += u64::from(live.count_ones());
-            self.medium.with(|worker| {
-                let (middle, length) = (cut.map(|[a, b]| 0.5 * (a + b)), cut.map(|[a, b]| b - a));
-                worker.rows.push(Row::new(0, live, middle, length));
-                self.entries(rays, worker, |_, entries| found = *entries);
-            });
-        }
+        let (mut found, mut live) = ([[0f32; 4]; LANES], 0);
+        self.medium.with(|worker| {
+            self.cut(cut, done, worker, counts);
+            live = worker.rows.first().map_or(0, |row| row.live);
+            self.entries(rays, worker, |_, entries| found = *entries);
+        });
         (found, live)
     }
 
     fn gather(
         &self,
         rays: Rays<'_>,
-        (packet, cuts): (&Packet, &Cuts),
+        at: (&Packet, &Cuts),
         first: i64,
         done: u32,
         chunk: &mut Chunk,
         counts: &mut Counts,
     ) -> i64 {
         self.medium.with(|worker| {
-            let mut add = |row: usize, live: u32| {
-                let t = (first + row as i64) as f64 + 0.5;
-                worker.rows.push(Row::new(row, live, [t * self.step; LANES], [self.step; LANES]));
-                counts.samples += u64::from(live.count_ones());
-            };
-            let next = match &self.skip {
-                Some(skip) => skip.rows((packet, cuts), (self.step, first), done, add),
-                None => {
-                    let from = cuts.from.map(|k| (k as i64 - first).clamp(0, CHUNK as i64) as usize);
-                    let to = cuts.to.map(|k| (k as i64 - first).clamp(0, CHUNK as i64) as usize);
-                    for row in 0..CHUNK {
-                        let inside = |l: usize| from[l] <= row && row < to[l];
-                        let live = (0..LANES).fold(0, |live, l| live | u32::from(inside(l)) << l) & !done;
-                        if live != 0 {
-                            add(row, live);
-                        }
-                    }
-                    let end = first + CHUNK as i64;
-                    let more = (0..LANES).any(|l| cuts.from[l] < cuts.to[l] && cuts.to[l] as i64 > end);
-                    if more { end } else { i64::MAX }
-                }
-            };
+            let next = self.rows(at, first, done, |row| {
+                counts.samples += u64::from(row.live.count_ones());
+                worker.rows.push(row);
+            });
             debug_assert!(worker.rows.len() <= ROWS);
             self.entries(rays, worker, |row, entries| chunk.put(row.number, entries));
             next

@@ -72,19 +72,35 @@ impl<'a> Field<'a> {
     }
 
     /// Sixteen positions relative to the base, of those that begin at `first`.
+    ///
+    /// # Safety
+    /// Called from a function compiled for `S` on a machine that has it.
     #[inline(always)]
-    fn at(&self, places: Places<'_>, first: usize) -> [[f32; LANES]; 3] {
+    unsafe fn at<S: Simd>(&self, places: Places<'_>, first: usize) -> [S::F; 3] {
+        // SAFETY: the caller's promise.
+        unsafe {
+            if !places.maps.is_empty() {
+                let at = self.carried_at(places, first);
+                return [S::load(&at[0]), S::load(&at[1]), S::load(&at[2])];
+            }
+            let x = S::load(sixteen(places.p[0], first));
+            let y = S::load(sixteen(places.p[1], first));
+            let z = S::load(sixteen(places.p[2], first));
+            let (m, o) = (self.linear, self.offset);
+            let mut at = [x; 3];
+            for a in 0..3 {
+                let sum = S::fma(S::splat(m.z_axis[a]), z, S::splat(o[a]));
+                let sum = S::fma(S::splat(m.y_axis[a]), y, sum);
+                at[a] = S::fma(S::splat(m.x_axis[a]), x, sum);
+            }
+            at
+        }
+    }
+
+    /// The same where a mesh carries the volume along.
+    fn carried_at(&self, places: Places<'_>, first: usize) -> [[f32; LANES]; 3] {
         let mut out = [[0f32; LANES]; 3];
         let p: [&[f32; LANES]; 3] = std::array::from_fn(|a| sixteen(places.p[a], first));
-        if places.maps.is_empty() {
-            let (m, o) = (self.linear, self.offset);
-            for l in 0..LANES {
-                for a in 0..3 {
-                    out[a][l] = m.x_axis[a] * p[0][l] + (m.y_axis[a] * p[1][l] + (m.z_axis[a] * p[2][l] + o[a]));
-                }
-            }
-            return out;
-        }
         let [from, size] = self.carried.map(|v| v.as_dvec3());
         for l in 0..LANES {
             let place = DVec3::new(f64::from(p[0][l]), f64::from(p[1][l]), f64::from(p[2][l]));
@@ -129,10 +145,23 @@ impl<'a> Field<'a> {
         &self.voxels
     }
 
+    /// Sixteen positions, as [`at`](Self::at), lane by lane.
+    fn by_lane(&self, places: Places<'_>, first: usize) -> [[f32; LANES]; 3] {
+        if !places.maps.is_empty() {
+            return self.carried_at(places, first);
+        }
+        let p: [&[f32; LANES]; 3] = std::array::from_fn(|a| sixteen(places.p[a], first));
+        let (m, o) = (self.linear, self.offset);
+        let number = |a: usize, l: usize| {
+            m.x_axis[a] * p[0][l] + (m.y_axis[a] * p[1][l] + (m.z_axis[a] * p[2][l] + o[a]))
+        };
+        std::array::from_fn(|a| std::array::from_fn(|l| number(a, l)))
+    }
+
     /// Something of each position relative to the base.
     pub fn each(&self, p: Places<'_>, n: usize, mut take: impl FnMut(usize, Vec3)) {
         for first in (0..n).step_by(LANES) {
-            let at = self.at(p, first);
+            let at = self.by_lane(p, first);
             (first..n.min(first + LANES)).for_each(|i| take(i, Vec3::from_array([0, 1, 2].map(|a| at[a][i - first]))));
         }
     }
@@ -147,10 +176,9 @@ pub unsafe fn values<S: Simd, F: Fetch>(field: &Field<'_>, p: Places<'_>, out: &
     let (scale, offset) = (field.units.scale, field.units.offset);
     let plain = scale == 1.0 && offset == 0.0;
     for (i, out) in out.as_chunks_mut::<LANES>().0.iter_mut().enumerate() {
-        let at = field.at(p, i * LANES);
         // SAFETY: the caller's promises.
         unsafe {
-            let at = [S::load(&at[0]), S::load(&at[1]), S::load(&at[2])];
+            let at = field.at::<S>(p, i * LANES);
             S::store(F::fetch::<S>(&field.voxels, &field.base, at), out);
         }
         if !plain {
@@ -170,23 +198,24 @@ pub unsafe fn gradients<S: Simd, F: Fetch>(field: &Field<'_>, p: Places<'_>, out
     let n = out.iter().map(|row| row.len()).max().unwrap_or(0);
     let half = 0.5 * field.units.scale as f32;
     for first in (0..n).step_by(LANES) {
-        let at = field.at(p, first);
         // SAFETY: the caller's promises.
         unsafe {
+            let at = field.at::<S>(p, first);
+            // Written out: what is called in a closure is not compiled for the unit.
             let [low, high] = field.roi;
-            let axis = |a: usize| {
-                S::min(S::max(S::load(&at[a]), S::splat(low[a])), S::splat(high[a]))
-            };
-            let at = [axis(0), axis(1), axis(2)];
+            let x = S::min(S::max(at[0], S::splat(low.x)), S::splat(high.x));
+            let y = S::min(S::max(at[1], S::splat(low.y)), S::splat(high.y));
+            let z = S::min(S::max(at[2], S::splat(low.z)), S::splat(high.z));
             // Along each axis of the data, over one voxel either way, up to the data's edge.
+            let (one, half) = (S::splat(1.0), S::splat(half));
             let mut along = [S::splat(0.0); 3];
-            for (a, along) in along.iter_mut().enumerate() {
-                let moved = |way: f32| {
-                    let mut moved = at;
-                    moved[a] = S::add(at[a], S::splat(way));
-                    F::fetch::<S>(&field.whole, &field.data, moved)
-                };
-                *along = S::mul(S::splat(half), S::sub(moved(1.0), moved(-1.0)));
+            for a in 0..3 {
+                let (mut after, mut before) = ([x, y, z], [x, y, z]);
+                after[a] = S::add(after[a], one);
+                before[a] = S::sub(before[a], one);
+                let after = F::fetch::<S>(&field.whole, &field.data, after);
+                let before = F::fetch::<S>(&field.whole, &field.data, before);
+                along[a] = S::mul(half, S::sub(after, before));
             }
             for (c, row) in out.iter_mut().enumerate() {
                 let Some(row) = row.get_mut(first..).and_then(<[f32]>::first_chunk_mut) else { continue };
@@ -199,7 +228,9 @@ pub unsafe fn gradients<S: Simd, F: Fetch>(field: &Field<'_>, p: Places<'_>, out
                     continue;
                 }
                 let mut by_axis = [[0f32; LANES]; 3];
-                (0..3).for_each(|a| S::store(along[a], &mut by_axis[a]));
+                for a in 0..3 {
+                    S::store(along[a], &mut by_axis[a]);
+                }
                 for l in 0..LANES {
                     let column = field.slope(p, first + l).col(c);
                     row[l] = column.x * by_axis[0][l] + column.y * by_axis[1][l] + column.z * by_axis[2][l];

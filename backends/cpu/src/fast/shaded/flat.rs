@@ -9,7 +9,7 @@ use super::{
     batch::{Evaluator, ROWS, Rays, Row, Worker},
 };
 use crate::fast::{
-    packet::Packet,
+    packet::{Lanes, Packet},
     simd::{LANES, Unit},
     walk::Counts,
 };
@@ -25,17 +25,11 @@ pub struct Flattened<'a> {
     unit: f64,
 }
 
-/// What came of a ray, and where: the extreme value's sample, or where sums begin.
-#[derive(Clone, Copy, Debug)]
+/// What came of a ray: a value, and the length that it holds for.
+#[derive(Clone, Copy, Debug, Default)]
 struct Reduced {
     value: f64,
     length: f64,
-    t: f64,
-    stands_for: f64,
-}
-
-impl Reduced {
-    const NONE: Self = Self { value: 0.0, length: 0.0, t: f64::INFINITY, stands_for: 0.0 };
 }
 
 impl<'a> Flattened<'a> {
@@ -67,14 +61,19 @@ impl<'a> Flattened<'a> {
         stretches: impl Iterator<Item = &'r Packet>,
         counts: &mut Counts,
     ) -> [Option<[f32; 4]>; LANES] {
-        let mut reduced = [Reduced::NONE; LANES];
+        let mut reduced = [Reduced::default(); LANES];
+        let (mut enters, mut inside) = ([f64::INFINITY; LANES], [0.0; LANES]);
         self.value.with(|worker| {
             for packet in stretches {
+                for l in (0..LANES).filter(|l| packet.active >> l & 1 == 1) {
+                    enters[l] = packet.start[l].min(enters[l]);
+                    inside[l] += packet.end[l] - packet.start[l];
+                }
                 self.take(packet, &mut reduced, rays, worker, counts);
             }
             self.evaluate(rays, worker, &mut reduced, counts);
         });
-        self.colors(rays, &reduced)
+        self.colors(rays, &reduced, (enters, inside))
     }
 
     /// Takes the segments of one stretch, in their order.
@@ -95,7 +94,7 @@ impl<'a> Flattened<'a> {
             if worker.rows.len() == ROWS {
                 self.evaluate(rays, worker, reduced, counts);
             }
-            worker.rows.push(Row::new(0, live, segments.map(|[a, b]| 0.5 * (a + b)), segments.map(|[a, b]| b - a)));
+            worker.rows.push(Row::new(0, live, segments.map(|[a, b]| 0.5 * (a + b)), segments.map(|[a, b]| (b - a) as f32)));
         };
         add(cuts.front, worker);
         let [first, last] = cuts.whole().unwrap_or([0, 0]);
@@ -120,39 +119,38 @@ impl<'a> Flattened<'a> {
                 counts.samples += u64::from(row.live.count_ones());
                 counts.lattice += u64::from(row.live.count_ones());
                 for l in (0..LANES).filter(|l| row.live >> l & 1 == 1 && !values[*l].is_nan()) {
-                    self.merge(&mut reduced[l], f64::from(values[l]), row.t[l], row.length[l]);
+                    self.merge(&mut reduced[l], f64::from(values[l]), f64::from(row.length[l]));
                 }
             }
         }
         worker.rows.clear();
     }
 
-    fn merge(&self, into: &mut Reduced, value: f64, t: f64, length: f64) {
+    fn merge(&self, into: &mut Reduced, value: f64, length: f64) {
         let first = into.length == 0.0;
-        match self.compositing {
-            Compositing::Maximum | Compositing::Minimum => {
-                let better = if self.compositing == Compositing::Maximum { value > into.value } else { value < into.value };
-                if first || better {
-                    *into = Reduced { value, length: 1.0, t, stands_for: length };
-                }
-            }
-            _ => {
-                into.value += value * length;
-                into.length += length;
-                into.stands_for = into.length;
-                into.t = into.t.min(t - 0.5 * length);
-            }
-        }
+        into.value = match self.compositing {
+            Compositing::Maximum | Compositing::Minimum if first => value,
+            Compositing::Maximum => into.value.max(value),
+            Compositing::Minimum => into.value.min(value),
+            _ => into.value + value * length,
+        };
+        into.length += length;
     }
 
-    fn colors(&self, rays: Rays<'_>, reduced: &[Reduced; LANES]) -> [Option<[f32; 4]>; LANES] {
+    /// Asks for the colours once, at the places where rays enter, for the lengths that they are inside.
+    fn colors(
+        &self,
+        rays: Rays<'_>,
+        reduced: &[Reduced; LANES],
+        (enters, inside): (Lanes, Lanes),
+    ) -> [Option<[f32; 4]>; LANES] {
         let live = (0..LANES).fold(0, |w, l| w | u32::from(reduced[l].length > 0.0) << l);
         let mut colors = [None; LANES];
         if live == 0 {
             return colors;
         }
         self.shade.with(|worker| {
-            let mut row = Row::new(0, live, reduced.map(|r| r.t), reduced.map(|r| r.stands_for));
+            let mut row = Row::new(0, live, enters, inside.map(|v| v as f32));
             row.value = reduced.map(|r| match self.compositing {
                 Compositing::Average => r.value / r.length,
                 Compositing::Add => r.value / self.unit,

@@ -1,17 +1,18 @@
 //! A lookup table as programs ask for it: straight colour and opacity, or colour and extinction,
 //! by values in data units.
 
+#![expect(unsafe_code, reason = "kernels of a vector unit")]
 #![expect(clippy::needless_range_loop, reason = "a lane indexes several arrays")]
 
 use volact_core::table::ResolvedTable;
 
 use crate::fast::{
-    direct::ln,
-    simd::LANES,
+    simd::{LANES, Simd},
     sweep::{
         lane::Lane,
         piece::{Run, Sight, cut},
     },
+    walk::ALL,
 };
 
 /// Most control points that are found by comparing with each of them.
@@ -71,76 +72,139 @@ impl Lookup {
     }
 
     /// How many control points are not above sixteen values.
+    ///
+    /// # Safety
+    /// Called from a function compiled for `S` on a machine that has it.
     #[inline(always)]
-    fn places(&self, value: &[f32; LANES]) -> [usize; LANES] {
+    unsafe fn places<S: Simd>(&self, value: &[f32; LANES]) -> S::I {
         let points = &self.values[..self.values.len() - 1];
-        if points.len() <= FEW {
-            let mut places = [0u32; LANES];
-            for point in points {
+        // SAFETY: the caller's promise.
+        unsafe {
+            if points.len() > FEW {
+                let mut found = [0f32; LANES];
                 for l in 0..LANES {
-                    places[l] += u32::from(value[l] >= *point);
+                    found[l] = self.search(value[l]) as f32;
                 }
+                return S::to_int(S::load(&found));
             }
-            return places.map(|p| p as usize);
+            let (value, one, none) = (S::load(value), S::splat_int(1), S::splat_int(0));
+            let mut places = none;
+            for point in points {
+                let below = S::lt_bits(value, S::splat(*point));
+                places = S::add_int(places, S::select_int(below, none, one));
+            }
+            places
         }
-        value.map(|value| {
-            let bin = ((value - self.low) * self.scale) as usize;
-            let mut after = self.bins[bin.min(self.bins.len() - 1)] as usize;
-            while after < points.len() && points[after] <= value {
-                after += 1;
-            }
-            after
-        })
     }
 
-    /// Straight colour and opacity of sixteen values, by number and lane; NaN for NaN.
+    /// The same of one value, from its bin on.
+    fn search(&self, value: f32) -> usize {
+        let last = self.values.len() - 1;
+        let bin = ((value - self.low) * self.scale) as usize;
+        let mut after = self.bins[bin.min(self.bins.len() - 1)] as usize;
+        while after < last && self.values[after] <= value {
+            after += 1;
+        }
+        after
+    }
+
+    /// Straight colour and opacity of sixteen values; NaN for NaN.
+    ///
+    /// # Safety
+    /// Called from a function compiled for `S` on a machine that has it.
     #[inline(always)]
-    pub fn classify(&self, value: &[f32; LANES]) -> [[f32; LANES]; 4] {
-        let places = self.places(value);
-        let mut rgba = [[0f32; LANES]; 4];
-        for l in 0..LANES {
-            let ([from, slope], anchor) = (&self.lines[places[l]], self.anchors[places[l]]);
+    unsafe fn classify<S: Simd>(&self, value: &[f32; LANES]) -> [S::F; 4] {
+        // SAFETY: the caller's promise; each place has a line of two rows, and an anchor.
+        unsafe {
+            let places = self.places::<S>(value);
+            let (mut first, mut second) = ([0i32; LANES], [0i32; LANES]);
+            let twice = S::add_int(places, places);
+            S::store_int(twice, &mut first);
+            S::store_int(S::add_int(twice, S::splat_int(1)), &mut second);
+            let table = self.lines.as_ptr().cast::<u8>();
+            let (from, slope) = (S::rows(table, &first), S::rows(table, &second));
+            let anchor = S::as_float(S::gather(self.anchors.as_ptr().cast(), S::shl::<2>(places)));
+            let value = S::load(value);
             // Infinite values stand beyond the last point, where nothing changes.
-            let off = value[l].clamp(f32::MIN, f32::MAX) - anchor;
+            let bounded = S::max(S::min(value, S::splat(f32::MAX)), S::splat(f32::MIN));
+            let off = S::sub(bounded, anchor);
+            let unknown = S::nan_bits(value);
+            let mut rgba = [off; 4];
             for c in 0..4 {
-                rgba[c][l] = from[c] + slope[c] * off;
+                rgba[c] = S::select(unknown, S::splat(f32::NAN), S::fma(slope[c], off, from[c]));
             }
+            rgba
         }
-        for l in 0..LANES {
-            let unknown = value[l].is_nan();
-            for row in &mut rgba {
-                row[l] = if unknown { f32::NAN } else { row[l] };
-            }
-        }
-        rgba
     }
 
-    /// Extinctions of opacities: −ln(1 − a) over the unit distance; none for NaN.
+    /// Extinctions of opacities: −ln(1 − a) over the unit distance; NaN for NaN.
+    ///
+    /// ln of the rounded u = 1 − a by Cephes' polynomial (S. Moshier, `logf`), and (1 − a − u)/u more
+    /// for what was rounded away, so that small opacities keep their digits.
+    ///
+    /// # Safety
+    /// Called from a function compiled for `S` on a machine that has it.
     #[inline(always)]
-    pub fn extinction(&self, opacity: &[f32; LANES]) -> [f32; LANES] {
-        let mut out = [0f32; LANES];
-        for (out, &a) in out.iter_mut().zip(opacity) {
-            let a = f64::from(a);
-            let sigma = -ln((1.0 - a).max(f64::MIN_POSITIVE)) / self.unit;
-            let sigma = if a > 0.0 { sigma as f32 } else { 0.0 };
-            *out = if a >= 1.0 { f32::INFINITY } else { sigma };
+    unsafe fn extinction<S: Simd>(&self, a: S::F) -> S::F {
+        const SERIES: [f32; 9] = [
+            7.037_683_6e-2,
+            -1.151_461e-1,
+            1.167_699_8e-1,
+            -1.242_014_1e-1,
+            1.424_932_3e-1,
+            -1.666_805_8e-1,
+            2.000_071_4e-1,
+            -2.499_999_4e-1,
+            3.333_333e-1,
+        ];
+        // SAFETY: the caller's promise.
+        unsafe {
+            let (zero, one) = (S::splat(0.0), S::splat(1.0));
+            let u = S::max(S::sub(one, a), S::splat(f32::MIN_POSITIVE));
+            let rounded = S::sub(S::sub(one, u), a);
+            // As a power of two times a number between √½ and √2.
+            let half = S::splat_int(std::f32::consts::FRAC_1_SQRT_2.to_bits() as i32);
+            let power = S::sar::<23>(S::sub_int(S::as_int(u), half));
+            let m = S::as_float(S::sub_int(S::as_int(u), S::shl::<23>(power)));
+            let (f, e) = (S::sub(m, one), S::to_float(power));
+            let mut series = S::splat(SERIES[0]);
+            for c in &SERIES[1..] {
+                series = S::fma(series, f, S::splat(*c));
+            }
+            let square = S::mul(f, f);
+            let mut log = S::mul(S::mul(square, f), series);
+            log = S::fma(e, S::splat(-2.121_944_4e-4), log);
+            log = S::fma(S::splat(-0.5), square, log);
+            log = S::add(f, S::add(log, S::div(rounded, u)));
+            log = S::fma(e, S::splat(0.693_359_4), log);
+            let sigma = S::mul(S::sub(zero, log), S::splat((1.0 / self.unit) as f32));
+            // Comparisons with NaN hold nowhere.
+            let some = S::lt_bits(zero, a);
+            let opaque = ALL & !S::lt_bits(a, one) & some;
+            let sigma = S::select(some, sigma, S::select(S::nan_bits(a), a, zero));
+            S::select(opaque, S::splat(f32::INFINITY), sigma)
         }
-        out
     }
 }
 
 /// What a table says of values: straight colour with opacity, or with extinction. Rows that nobody
 /// wants are empty.
+///
+/// # Safety
+/// Called from a function compiled for `S` on a machine that has it.
 #[inline(always)]
-pub fn classified(table: &Lookup, values: &[f32], out: &mut [&mut [f32]], medium: bool) {
+pub unsafe fn classified<S: Simd>(table: &Lookup, values: &[f32], out: &mut [&mut [f32]], medium: bool) {
     for (i, value) in values.as_chunks::<LANES>().0.iter().enumerate() {
-        let mut rgba = table.classify(value);
-        if medium {
-            rgba[3] = table.extinction(&rgba[3]);
-        }
-        for (row, numbers) in out.iter_mut().zip(&rgba) {
-            if let Some(to) = row.as_chunks_mut::<LANES>().0.get_mut(i) {
-                *to = *numbers;
+        // SAFETY: the caller's promise.
+        unsafe {
+            let mut rgba = table.classify::<S>(value);
+            if medium {
+                rgba[3] = table.extinction::<S>(rgba[3]);
+            }
+            for (row, numbers) in out.iter_mut().zip(rgba) {
+                if let Some(to) = row.as_chunks_mut::<LANES>().0.get_mut(i) {
+                    S::store(numbers, to);
+                }
             }
         }
     }
@@ -180,6 +244,7 @@ impl Segments {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fast::{dispatch, simd::Unit};
     use volact_core::{ControlPoint, LookupTable};
 
     #[test]
@@ -188,23 +253,31 @@ mod tests {
         let few = vec![point(-3.0, 0.0), point(0.0, 0.4), point(0.0, 0.9), point(0.01, 0.2), point(90.0, 1.0)];
         let mut many: Vec<_> = (0..60).map(|i| point(f64::from(i), f64::from(i % 7) / 7.0)).collect();
         many.insert(30, point(30.0, 1.0));
-        for points in [few, many] {
-            let table = LookupTable::from_points(points).unwrap().resolve([0.0, 1.0]);
-            let lookup = Lookup::new(&table, 2.5);
-            let extremes = [f32::INFINITY, f32::NEG_INFINITY, 1e30, -1e30, f32::MAX, 0.0];
-            let values: Vec<f32> = (-400..10_000).map(|i| i as f32 * 0.01).chain(extremes).collect();
-            for value in values {
-                let (found, wanted) = (lookup.classify(&[value; LANES]), table.classify(f64::from(value)));
-                let found = found.map(|row| row[3]);
-                assert!((0..4).all(|c| (f64::from(found[c]) - wanted[c]).abs() < 2e-4), "{value}: {found:?}");
-                let (sigma, a) = (f64::from(lookup.extinction(&[found[3]; LANES])[0]), f64::from(found[3]));
-                let wanted = if a >= 1.0 { f64::INFINITY } else { -(-a).ln_1p() / 2.5 };
-                assert!(sigma == wanted || (sigma - wanted).abs() <= 2e-7 * wanted, "{value}: {sigma}, not {wanted}");
+        let faint = vec![point(0.0, 0.0), point(1.0, 1e-6), point(2.0, 1e-3), point(3.0, 0.999), point(4.0, 0.4)];
+        for unit in [Unit::Plain, Unit::Avx2, Unit::Avx512].into_iter().filter(|u| u.available()) {
+            let look = |lookup: &Lookup, value: f32, medium: bool| {
+                let mut rows = [[0f32; LANES]; 4];
+                let mut out = rows.each_mut().map(|row| row.as_mut_slice());
+                dispatch::classified(unit, lookup, &[value; LANES], &mut out, medium);
+                rows.map(|row| f64::from(row[LANES - 1]))
+            };
+            for points in [few.clone(), many.clone(), faint.clone()] {
+                let table = LookupTable::from_points(points).unwrap().resolve([0.0, 1.0]);
+                let lookup = Lookup::new(&table, 2.5);
+                let extremes = [f32::INFINITY, f32::NEG_INFINITY, 1e30, -1e30, f32::MAX, 0.0];
+                let values: Vec<f32> = (-400..10_000).map(|i| i as f32 * 0.01).chain(extremes).collect();
+                for value in values {
+                    let (found, wanted) = (look(&lookup, value, false), table.classify(f64::from(value)));
+                    assert!((0..4).all(|c| (found[c] - wanted[c]).abs() < 2e-4), "{value}: {found:?}");
+                    let (sigma, a) = (look(&lookup, value, true)[3], found[3]);
+                    let wanted = if a >= 1.0 { f64::INFINITY } else { -(-a).ln_1p() / 2.5 };
+                    let close = sigma == wanted || (sigma - wanted).abs() <= 4e-7 * wanted;
+                    assert!(close, "{unit:?}: opacity {a} has {sigma}, not {wanted}");
+                }
+                assert!(look(&lookup, f32::NAN, true).iter().all(|v| v.is_nan()));
             }
-            assert!(lookup.classify(&[f32::NAN; LANES])[3][0].is_nan());
-            assert_eq!(lookup.extinction(&[f32::NAN; LANES])[0], 0.0);
+            let one = LookupTable::from_points([point(7.0, 0.3)]).unwrap().resolve([0.0, 1.0]);
+            assert!((look(&Lookup::new(&one, 1.0), 1e30, false)[3] - 0.3).abs() < 1e-7);
         }
-        let one = LookupTable::from_points([point(7.0, 0.3)]).unwrap().resolve([0.0, 1.0]);
-        assert_eq!(Lookup::new(&one, 1.0).classify(&[1e30; LANES])[3][0], 0.3);
     }
 }

@@ -22,7 +22,7 @@ pub mod trail;
 use std::sync::Arc;
 
 use volact_core::{
-    ActionError, Compositing, ParameterType, ParameterValue, ShaderEntry, TableInterpolation,
+    ActionError, Compositing, ParameterType, ParameterValue, ShaderEntry, SliceStyle, TableInterpolation,
     glam::{DAffine3, DVec3},
     parameter::ParameterMap,
     resolve::ResolvedShape,
@@ -30,7 +30,7 @@ use volact_core::{
 use volact_shaders::{Entry, Kernel, Program, eval::Uniforms, signatures::Derived};
 
 use super::options::Classification;
-pub use absorb::absorb;
+pub use absorb::{absorb, composite};
 pub use chosen::Chosen;
 pub use crossings::Crossings;
 pub use dense::Dense;
@@ -62,6 +62,11 @@ pub fn refused(shape: &ResolvedShape) -> Option<(String, String)> {
     if geometry.slices().is_some() && shape.compositing() != Compositing::Over {
         let what = format!("slice planes with shader {name:?} of compositing {}", shape.compositing().name());
         return Some((what, "draw them with a shader of compositing over".into()));
+    }
+    let blended = geometry.slices().is_some_and(|s| s.style == SliceStyle::Blended);
+    if blended && shape.float("unit_distance").is_none() {
+        let what = format!("blended slice planes with shader {name:?}, which has no unit_distance");
+        return Some((what, "declare that parameter, or draw opaque planes".into()));
     }
     let before =
         |v: &ParameterValue| matches!(v, ParameterValue::Table(t) if t.interpolation() == TableInterpolation::Pre);
@@ -170,7 +175,7 @@ impl Shader {
         let parameters = &self.entry.declaration.parameters;
         let name = |i: usize| {
             let function = kernel.functions().get(i)?;
-            let plain = matches!(function.derived, Derived::Value | Derived::Medium);
+            let plain = matches!(function.derived, Derived::Value | Derived::Medium | Derived::TableColor);
             parameters.get(function.parameter).filter(|_| plain).map(|p| p.name.as_str())
         };
         Some([name(volume)?, name(table)?])
