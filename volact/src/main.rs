@@ -4,7 +4,7 @@
 
 mod commands;
 
-use std::{io::Write, process::ExitCode};
+use std::process::ExitCode;
 
 use clap::Parser;
 use log::LevelFilter;
@@ -35,7 +35,7 @@ fn main() -> ExitCode {
     match cli.command.run() {
         Ok(code) => code,
         Err(error) => {
-            report(&error);
+            commands::print_error(&error);
             ExitCode::from(2)
         }
     }
@@ -56,14 +56,4 @@ fn start_log(verbose: u8, quiet: bool) {
         .format_timestamp(None)
         .format_target(verbose > 1)
         .init();
-}
-
-/// Prints an error with all its causes, one a line.
-fn report(error: &anyhow::Error) {
-    let mut text = format!("error: {error}\n");
-    for cause in error.chain().skip(1) {
-        text.push_str(&format!("  because: {cause}\n"));
-    }
-    // Nobody is left to tell where stderr is closed.
-    _ = std::io::stderr().write_all(text.as_bytes());
 }

@@ -1,6 +1,7 @@
 //! What people who work on Volact repeat: `cargo xtask --help`.
 
 mod check;
+mod docs;
 mod evaluator;
 mod header;
 mod mesh_peers;
@@ -31,6 +32,8 @@ enum Task {
     Peers(peers::Args),
     /// Compare with VTK's mappers of unstructured grids on real meshes, in turn, and write the table.
     MeshPeers(mesh_peers::Args),
+    /// Write docs/reference anew: pages and pictures of all that is registered.
+    Docs(docs::Args),
     /// Generate the C header of the plugin boundary.
     Header,
     /// Make a plugin's crate that builds, tests itself and draws something.
@@ -48,6 +51,7 @@ fn main() -> anyhow::Result<()> {
         Task::Peer(args) => peer::run(&args),
         Task::Peers(args) => peers::run(&args),
         Task::MeshPeers(args) => mesh_peers::run(&args),
+        Task::Docs(args) => docs::run(&args),
         Task::Header => header::run(),
         Task::NewPlugin(args) => new_plugin::run(&args),
         Task::Evaluator(args) => evaluator::run(&args),

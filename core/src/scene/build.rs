@@ -12,7 +12,7 @@ use glam::{DAffine3, DVec3};
 use thiserror::Error as ThisError;
 
 use super::{
-    CameraSpec, Folders, OpaqueDepthSpec, OpaqueSpec, ParameterSpec, Problem, Problems, SceneFile, ShapeSpec,
+    CameraSpec, Folders, KeptData, OpaqueDepthSpec, OpaqueSpec, ParameterSpec, Problem, Problems, SceneFile, ShapeSpec,
     TransformStep, check, document::MAX_BYTES, values,
 };
 use crate::{
@@ -72,17 +72,36 @@ impl SceneFile {
         folders: impl Into<Folders<'a>>,
         progress: &dyn Progress,
     ) -> Result<Scene, Problems> {
+        self.build_keeping(registry, folders, progress, &mut KeptData::default())
+    }
+
+    /// As [`build`](Self::build), with what was read for an earlier version of the scene, which is
+    /// not read again. What this version does not use is forgotten.
+    ///
+    /// # Errors
+    /// As [`build`](Self::build); nothing is forgotten then.
+    pub fn build_keeping<'a>(
+        &self,
+        registry: &Registry,
+        folders: impl Into<Folders<'a>>,
+        progress: &dyn Progress,
+        kept: &mut KeptData,
+    ) -> Result<Scene, Problems> {
         let mut problems = check::references(self);
         problems.extend(check::check(self, registry));
         if !problems.is_empty() {
             return Err(Problems::new(problems));
         }
         let mut build = Build { scene: self, registry, folders: folders.into(), data: BTreeMap::new(), problems };
-        build.load(progress);
+        build.load(progress, kept);
         let shapes: Vec<_> = self.shapes.iter().enumerate().filter_map(|(i, s)| build.shape(i, s)).collect();
         let frame = build.frame(&shapes);
         let action = self.action.as_ref().map(|a| (a.name.clone(), plain(&a.options)));
-        if build.problems.is_empty() { Ok(Scene { shapes, frame, action }) } else { Err(Problems::new(build.problems)) }
+        if !build.problems.is_empty() {
+            return Err(Problems::new(build.problems));
+        }
+        kept.retain_used();
+        Ok(Scene { shapes, frame, action })
     }
 }
 

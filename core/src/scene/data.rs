@@ -1,8 +1,10 @@
 //! Loads the data of a scene, each file once, and gives it out as what a shape asks for.
 
+use std::path::PathBuf;
+
 use super::{
-    DataAttributeSpec, DataSpec, GeometrySpec, ParameterSpec, ShapeSpec, VolumeSpec,
-    build::{Build, chain, compose, plain},
+    DataAttributeSpec, DataSpec, GeometrySpec, KeptData, ParameterSpec, ShapeSpec, VolumeSpec,
+    build::{Build, chain, compose},
 };
 use crate::{Attribute, Buffer, Data, MeshData, Progress, Volume, VolumeTexture};
 
@@ -11,32 +13,33 @@ const OF_VOLUMES: [&str; 5] = ["spacing", "placement", "slope", "intercept", "un
 
 impl<'a> Build<'a> {
     /// Reads every file that a shape uses, once.
-    pub(super) fn load(&mut self, progress: &dyn Progress) {
-        let mut read: Vec<(&DataSpec, Data)> = Vec::new();
+    pub(super) fn load(&mut self, progress: &dyn Progress, kept: &mut KeptData) {
         let scene = self.scene;
         let used = |name: &str| scene.shapes.iter().any(|shape| shape.uses(name));
         for (name, spec) in scene.data.iter().filter(|(name, _)| used(name)) {
-            let same = |s: &DataSpec| s.file == spec.file && s.loader == spec.loader && s.options == spec.options;
-            let data = match read.iter().find(|(s, _)| same(s)) {
-                Some((_, data)) => Some(data.clone()),
-                None => self.read(name, spec, progress),
-            };
-            let Some(data) = data else { continue };
-            read.push((spec, data.clone()));
-            if let Some(data) = self.adjust(name, spec, data) {
+            let Some((path, data)) = self.read(name, spec, progress, kept) else { continue };
+            let adjusted = kept.adjusted(&path, spec).or_else(|| self.adjust(name, spec, data));
+            if let Some(data) = adjusted {
+                kept.set_adjusted(&path, spec, &data);
                 self.data.insert(name, data);
             }
         }
     }
 
-    fn read(&mut self, name: &str, spec: &DataSpec, progress: &dyn Progress) -> Option<Data> {
+    fn read(
+        &mut self,
+        name: &str,
+        spec: &DataSpec,
+        progress: &dyn Progress,
+        kept: &mut KeptData,
+    ) -> Option<(PathBuf, Data)> {
         let at = format!("data.{name}.file");
         let path = match self.folders.path(&spec.file) {
             Ok(path) => path,
             Err((found, wanted)) => return self.refuse(&at, found, wanted),
         };
-        match self.registry.load_any(&path, spec.loader.as_deref(), &plain(&spec.options), progress) {
-            Ok(data) => Some(data),
+        match kept.load(self.registry, &path, spec, progress) {
+            Ok(data) => Some((path, data)),
             Err(error) => self.refuse(&at, chain(&error), "a volume, mesh or surface"),
         }
     }

@@ -37,8 +37,10 @@ mod cuts;
 mod data;
 mod description;
 mod document;
+mod files;
 mod folders;
 mod geometry;
+mod kept;
 mod lexer;
 mod meshes;
 mod parameters;
@@ -60,7 +62,9 @@ pub use description::{
     TransformStep, VolumeSpec,
 };
 pub use document::{MAX_BYTES, MAX_DEPTH, MAX_NODES};
+pub use files::SceneFiles;
 pub use folders::{DATA_PREFIX, Folders};
+pub use kept::KeptData;
 pub use problem::{Problem, Problems, Spot};
 pub use reader::MAX_NAME;
 

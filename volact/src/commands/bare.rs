@@ -4,10 +4,13 @@ use std::{path::Path, sync::Arc};
 
 use anyhow::{Context as _, bail, ensure};
 use volact::{
-    Appearance, Data, LoadOptions, LookupTable, MeshData, ParameterDecl, Registry, Shape, SliceStyle, Sliced, Slices,
-    Volume, VolumeTexture,
+    Appearance, Data, LookupTable, MeshData, ParameterDecl, Registry, Shape, SliceStyle, Sliced, Slices, Volume,
+    VolumeTexture,
     config::Config,
-    core::{glam::DVec3, scene::Scene},
+    core::{
+        glam::DVec3,
+        scene::{DataSpec, KeptData, ParameterSpec, Scene},
+    },
     transfer,
 };
 
@@ -19,10 +22,15 @@ use super::{
 };
 
 /// Reads the data and chooses how to show them; what was chosen, in words.
-pub fn open(args: &Args, registry: &Registry, config: &Config) -> anyhow::Result<(Scene, Vec<String>)> {
+pub fn open(
+    args: &Args,
+    registry: &Registry,
+    config: &Config,
+    kept: &mut KeptData,
+) -> anyhow::Result<(Scene, Vec<String>)> {
     let Size([width, height]) = args.size.unwrap_or(Size(config.size));
     let up = args.up.unwrap_or(DVec3::Z);
-    let (shape, frame, notes) = match load(args, registry)? {
+    let (shape, frame, notes) = match load(args, registry, kept)? {
         Data::Volume(volume) => {
             ensure!(args.attribute.is_none(), "--attribute is for meshes; {} holds a volume", args.input.display());
             let automatic = transfer::automatic(&volume);
@@ -42,11 +50,13 @@ pub fn open(args: &Args, registry: &Registry, config: &Config) -> anyhow::Result
     Ok((Scene { shapes: vec![shape], frame, action: None }, notes))
 }
 
-fn load(args: &Args, registry: &Registry) -> anyhow::Result<Data> {
-    let options: LoadOptions = settings::options(&args.load)?;
+fn load(args: &Args, registry: &Registry, kept: &mut KeptData) -> anyhow::Result<Data> {
+    let options = settings::options(&args.load)?.into_iter();
+    let options = options.map(|(name, value)| (name, ParameterSpec::Value(value))).collect();
+    let spec = DataSpec { file: args.input.clone(), loader: args.loader.clone(), options, ..Default::default() };
     let line = Line::new(format!("reading {}", args.input.display()));
     let cannot = || format!("{}: cannot be drawn", args.input.display());
-    registry.load_any(&args.input, args.loader.as_deref(), &options, &line).with_context(cannot)
+    kept.load(registry, &args.input, &spec, &line).with_context(cannot)
 }
 
 fn volume_shape(

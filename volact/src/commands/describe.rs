@@ -1,6 +1,6 @@
-//! `volact describe [NAME]`: what is registered, and what it takes.
+//! `volact describe [NAME]`: what is registered, and what it takes; as pages, see `reference`.
 
-use std::{fmt::Write as _, process::ExitCode};
+use std::{fmt::Write as _, path::PathBuf, process::ExitCode};
 
 use anyhow::bail;
 use volact::{
@@ -8,17 +8,41 @@ use volact::{
     core::{names, parameter::Kind},
 };
 
+use super::reference::{self, KINDS, Place};
+
 /// Arguments of `volact describe`.
 #[derive(clap::Args)]
 pub struct Args {
     /// The name of an action, shader, geometry or loader; all are listed without one
+    #[arg(conflicts_with = "all")]
     name: Option<String>,
+    /// Describe all in full
+    #[arg(long)]
+    all: bool,
+    /// Write that as pages into a folder, and draw its scenes/KIND-NAME.ron into pictures/
+    #[arg(long, value_name = "FOLDER", requires = "all")]
+    markdown: Option<PathBuf>,
+    /// Draw no pictures for the pages
+    #[arg(long, requires = "markdown")]
+    text_only: bool,
+    /// Link the sources of the shaders that come with Volact as LINK/NAME.wgsl
+    #[arg(long, value_name = "LINK", requires = "markdown")]
+    sources: Option<String>,
+    /// The folder for paths in the pages' scenes that begin with $VOLACT_DATA
+    #[arg(long, value_name = "FOLDER", requires = "markdown")]
+    data_dir: Option<PathBuf>,
 }
 
 /// Prints declarations.
 pub fn run(args: Args, registry: &Registry) -> anyhow::Result<ExitCode> {
     let all = registry.declarations();
+    if let Some(folder) = &args.markdown {
+        let place = Place { folder, sources: args.sources.as_deref(), data: args.data_dir.as_deref() };
+        reference::write(registry, &place, !args.text_only)?;
+        return Ok(ExitCode::SUCCESS);
+    }
     let text = match &args.name {
+        None if args.all => all.iter().map(|d| full(d, registry)).collect::<Vec<_>>().join("\n"),
         None => list(&all),
         Some(name) => {
             let found: Vec<_> = all.iter().copied().filter(|d| d.name == *name).collect();
@@ -36,13 +60,12 @@ pub fn run(args: Args, registry: &Registry) -> anyhow::Result<ExitCode> {
 fn list(all: &[&Declaration]) -> String {
     let mut text = String::new();
     let width = all.iter().map(|d| d.name.len()).max().unwrap_or(0);
-    for kind in [Kind::Action, Kind::Shader, Kind::Geometry, Kind::Loader] {
+    for (kind, plural) in KINDS {
         let of_kind: Vec<_> = all.iter().filter(|d| d.kind == kind).collect();
         if of_kind.is_empty() {
             continue;
         }
         let gap = if text.is_empty() { "" } else { "\n" };
-        let plural = if kind == Kind::Geometry { "geometries".into() } else { format!("{}s", kind.name()) };
         _ = writeln!(text, "{gap}{plural}");
         for d in of_kind {
             _ = writeln!(text, "  {:width$}  {}", d.name, d.description);
@@ -95,22 +118,34 @@ fn capabilities(name: &str, registry: &Registry) -> String {
 
 /// `name  types, required or default, bounds or choices, unit` and below it what it does.
 fn parameter(p: &ParameterDecl) -> String {
-    let types = p.types.iter().map(|t| t.name()).collect::<Vec<_>>().join(" or ");
-    let mut facts = vec![types];
+    let mut facts = vec![takes(p)];
     facts.push(match (&p.default, p.required) {
         (Some(value), _) => format!("default {value}"),
         (None, true) => "required".into(),
         (None, false) => "optional".into(),
     });
-    facts.extend(p.bounds.map(bounds));
-    if !p.choices.is_empty() {
-        facts.push(format!("one of {}", p.choices.join(", ")));
-    }
+    facts.extend(allowed(p));
     if !p.unit.is_empty() {
         facts.push(format!("in {}", p.unit));
     }
-    let description = p.description.split_whitespace().collect::<Vec<_>>().join(" ");
-    format!("    {}: {}\n        {description}\n", p.name, facts.join("; "))
+    format!("    {}: {}\n        {}\n", p.name, facts.join("; "), one_line(&p.description))
+}
+
+/// The types that a parameter takes.
+pub fn takes(p: &ParameterDecl) -> String {
+    p.types.iter().map(|t| t.name()).collect::<Vec<_>>().join(" or ")
+}
+
+/// Its bounds or choices.
+pub fn allowed(p: &ParameterDecl) -> Option<String> {
+    let choices = (!p.choices.is_empty()).then(|| format!("one of {}", p.choices.join(", ")));
+    let all: Vec<_> = p.bounds.map(bounds).into_iter().chain(choices).collect();
+    (!all.is_empty()).then(|| all.join("; "))
+}
+
+/// A description without its line breaks.
+pub fn one_line(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 fn bounds([lowest, highest]: [f64; 2]) -> String {

@@ -1,5 +1,5 @@
 //! The subcommands, one module each, and what they share: `source` (what to draw; `bare`, `cuts`),
-//! `settings`, `progress`, `report`.
+//! `settings`, `progress`, `report`; `watch` draws again and again.
 
 pub mod bare;
 pub mod bench;
@@ -10,19 +10,22 @@ pub mod describe;
 pub mod info;
 pub mod plugins;
 pub mod progress;
+pub mod reference;
 pub mod render;
 pub mod report;
 pub mod settings;
 pub mod source;
+pub mod watch;
 
 use std::{
     io::Write,
-    path::Path,
+    path::{Path, PathBuf},
     process::ExitCode,
     sync::atomic::{AtomicBool, Ordering},
 };
 
 use clap::Subcommand;
+use volact::config::Config;
 
 /// What the user asks for.
 #[derive(Subcommand)]
@@ -51,6 +54,11 @@ impl Command {
         let mut registry = volact::with_builtins();
         registry.set_progress(progress::watch());
         let plugins = self.load_plugins(&mut registry)?;
+        if let Self::Render(args) = &self
+            && args.watch
+        {
+            return watch::run(args, &registry);
+        }
         self.load_shaders(&mut registry)?;
         match self {
             Self::Render(args) => render::run(args, &registry),
@@ -76,13 +84,8 @@ impl Command {
             Self::Describe(_) => (None, None),
             _ => return Ok(()),
         };
-        for folder in settings::config(named)?.shader_folders {
+        for folder in shader_folders(&settings::config(named)?, scene) {
             volact::shaders::add_folder(registry, &folder)?;
-        }
-        match scene.and_then(Path::parent) {
-            Some(beside) if beside.as_os_str().is_empty() => volact::shaders::add_folder(registry, Path::new("."))?,
-            Some(beside) if beside.is_dir() => volact::shaders::add_folder(registry, beside)?,
-            _ => {}
         }
         Ok(())
     }
@@ -100,6 +103,17 @@ impl Command {
     }
 }
 
+/// Where shaders are: the config's folders, and that of the scene.
+fn shader_folders(config: &Config, scene: Option<&Path>) -> Vec<PathBuf> {
+    let mut folders = config.shader_folders.clone();
+    match scene.and_then(Path::parent) {
+        Some(beside) if beside.as_os_str().is_empty() => folders.push(".".into()),
+        Some(beside) if beside.is_dir() => folders.push(beside.into()),
+        _ => {}
+    }
+    folders
+}
+
 /// Where the user or the system ends the command, no part of a picture stays behind.
 fn leave_nothing_half_done() {
     let told = ctrlc::set_handler(|| {
@@ -110,6 +124,16 @@ fn leave_nothing_half_done() {
     if let Err(error) = told {
         log::debug!("signals are not heard: {error}");
     }
+}
+
+/// Prints an error with all its causes, one a line.
+pub fn print_error(error: &anyhow::Error) {
+    let mut text = format!("error: {error}\n");
+    for cause in error.chain().skip(1) {
+        text.push_str(&format!("  because: {cause}\n"));
+    }
+    // Nobody is left to tell where stderr is closed.
+    _ = std::io::stderr().write_all(text.as_bytes());
 }
 
 static QUIET: AtomicBool = AtomicBool::new(false);

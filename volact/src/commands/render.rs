@@ -19,14 +19,15 @@ use super::{progress::Line, report::Report, source, source::Source};
     volact render scene.ron --set unit_distance=2 --set 'skin.lookup_table=WindowLevel(window: 400, level: 40, opacity: 0.1)'\n  \
     volact render scene.ron --action cpu --option classification=post --step 0.25 -o exact.exr\n  \
     volact render room.vtu --up y --attribute t --slice z=50% --slice x=1.5 --around-slices\n  \
-    volact render part.stl --clip 'y>0'\n\
+    volact render part.stl --clip 'y>0'\n  \
+    volact render scene.ron --watch               and again after each edit of its files\n\
     Existing pictures are replaced; a picture appears whole or not at all. `volact describe` lists what names mean.")]
 pub struct Args {
     #[command(flatten)]
-    source: source::Args,
+    pub source: source::Args,
     /// The action that draws; the scene's, else the first preferred one that can
     #[arg(short, long, value_name = "NAME")]
-    action: Option<String>,
+    pub action: Option<String>,
     /// The picture: .png, .exr or .npy [default: the input's name with .png, in the current folder]
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -38,15 +39,15 @@ pub struct Args {
     sixteen_bit: bool,
     /// Print the summary as JSON
     #[arg(long)]
-    json: bool,
+    pub json: bool,
+    /// Stay, and draw anew whenever a file changes that the picture depends on; Ctrl-C ends it
+    #[arg(long)]
+    pub watch: bool,
 }
 
 /// Draws, writes and prints a summary.
 pub fn run(args: Args, registry: &Registry) -> anyhow::Result<ExitCode> {
-    let output = match &args.output {
-        Some(path) => path.clone(),
-        None => default_output(&args.source.input)?,
-    };
+    let output = args.output()?;
     let png = args.png(&output)?;
     let mut source = Source::open(&args.source, args.action.as_deref(), registry)?;
     let line = Line::new(format!("drawing with {}", source.choice.name));
@@ -74,8 +75,13 @@ impl Args {
         Some(self.source.input.as_path()).filter(|path| path.extension().is_some_and(|e| e == "ron"))
     }
 
+    /// The picture's file.
+    pub fn output(&self) -> anyhow::Result<PathBuf> {
+        self.output.clone().map_or_else(|| default_output(&self.source.input), Ok)
+    }
+
     /// What a PNG shall be; all that can be said before drawing is said here.
-    fn png(&self, output: &Path) -> anyhow::Result<PngOptions> {
+    pub fn png(&self, output: &Path) -> anyhow::Result<PngOptions> {
         let format = PictureFormat::of(output)?;
         if format != PictureFormat::Png && (self.straight_alpha || self.sixteen_bit) {
             bail!(

@@ -124,6 +124,7 @@ impl Report<'_> {
             "statistics": {
                 "total_ms": milliseconds(s.total), "prepare_ms": milliseconds(s.prepare),
                 "render_ms": milliseconds(s.render), "rays": s.rays, "samples": s.samples, "skipped": s.skipped,
+                "rebuilt": s.rebuilt.iter().map(|r| json!({"shape": r.shape, "what": r.what, "bytes": r.bytes})).collect::<Vec<_>>(),
                 "resident_bytes": s.resident_bytes, "uploaded_bytes": s.uploaded_bytes, "threads": s.threads,
                 "details": s.details.iter().map(|(k, v)| (k.clone(), json!(v))).collect::<serde_json::Map<_, _>>(),
             },

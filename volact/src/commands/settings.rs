@@ -102,14 +102,23 @@ pub fn options(settings: &[Setting]) -> anyhow::Result<Options> {
 /// user's config folder if it is there, else the defaults. An empty `VOLACT_CONFIG` means the
 /// defaults.
 pub fn config(named: Option<PathBuf>) -> anyhow::Result<Config> {
-    let from_env = env::var_os("VOLACT_CONFIG");
-    if named.is_none() && from_env.as_ref().is_some_and(|path| path.is_empty()) {
-        return Ok(Config::default());
-    }
-    let path = named.or(from_env.map(PathBuf::from)).or_else(|| user_config().filter(|path| path.is_file()));
+    let path = config_file(named.clone()).filter(|path| named.is_some() || from_env().is_some() || path.is_file());
     let Some(path) = path else { return Ok(Config::default()) };
     log::info!("config {}", path.display());
     Config::open(&path).context("the config cannot be used")
+}
+
+/// The config file that is, or would be, in force.
+pub fn config_file(named: Option<PathBuf>) -> Option<PathBuf> {
+    match (named, from_env()) {
+        (Some(named), _) => Some(named),
+        (None, Some(path)) => Some(path).filter(|path| !path.as_os_str().is_empty()),
+        (None, None) => user_config(),
+    }
+}
+
+fn from_env() -> Option<PathBuf> {
+    env::var_os("VOLACT_CONFIG").map(PathBuf::from)
 }
 
 fn user_config() -> Option<PathBuf> {

@@ -8,7 +8,7 @@ use volact::{
     config::Config,
     core::{
         glam::DVec3,
-        scene::{CameraSpec, Folders, Scene, SceneFile},
+        scene::{CameraSpec, Folders, KeptData, Scene, SceneFile, SceneFiles},
         select::{self, Choice},
     },
 };
@@ -137,11 +137,16 @@ impl Source {
 impl Args {
     /// Reads everything.
     pub fn open(&self, registry: &Registry) -> anyhow::Result<Opened> {
+        self.open_keeping(registry, &mut KeptData::default())
+    }
+
+    /// Reads everything but the data that are kept from the last time.
+    pub fn open_keeping(&self, registry: &Registry, kept: &mut KeptData) -> anyhow::Result<Opened> {
         let config = settings::config(self.config.clone())?;
         let options = self.options()?;
         let (mut scene, notes) = match self.is_scene() {
-            true => (self.scene(registry, &config)?, Vec::new()),
-            false => bare::open(self, registry, &config)?,
+            true => (self.scene(registry, &config, kept)?, Vec::new()),
+            false => bare::open(self, registry, &config, kept)?,
         };
         let bounds = bounds(&scene.shapes);
         for cut in &self.clip {
@@ -151,7 +156,7 @@ impl Args {
     }
 
     /// Whether the input is a scene: `.ron`, but not the `.raw.ron` that describes raw voxels.
-    fn is_scene(&self) -> bool {
+    pub fn is_scene(&self) -> bool {
         let name = self.input.file_name().map(|name| name.to_string_lossy().to_lowercase()).unwrap_or_default();
         name.ends_with(".ron") && !name.ends_with(".raw.ron")
     }
@@ -167,7 +172,7 @@ impl Args {
         Ok(options)
     }
 
-    fn scene(&self, registry: &Registry, config: &Config) -> anyhow::Result<Scene> {
+    fn scene(&self, registry: &Registry, config: &Config, kept: &mut KeptData) -> anyhow::Result<Scene> {
         let bare = self.up.is_some() || self.shader.is_some() || self.attribute.is_some() || !self.slice.is_empty();
         if bare || self.loader.is_some() || !self.load.is_empty() {
             bail!(
@@ -176,22 +181,39 @@ impl Args {
         }
         let cannot = || format!("{}: cannot be drawn", self.input.display());
         let mut file = SceneFile::open(&self.input, registry).with_context(cannot)?;
-        let names: Vec<_> = (0..file.shapes.len()).map(|i| file.shape_name(i)).collect();
-        for setting in &self.set {
-            let (shape, parameter) = settings::shape_of(&setting.name, &names)?;
-            file.set_parameter(shape, parameter, &setting.value);
-        }
+        self.change(&mut file)?;
         let view = self.view.map(CameraSpec::View);
         file.camera = view.or(file.camera).or(Some(CameraSpec::View(config.view)));
         let Size(size) = self.size.unwrap_or(Size(file.image.size.unwrap_or(config.size)));
         file.image.size = Some(size);
         file.image.background = self.background.or(file.image.background).or(Some(config.background));
         let data = self.data_folder();
-        let folders = Folders { base: self.input.parent().unwrap_or(Path::new("")), data: data.as_deref() };
         let line = Line::new("reading");
-        file.build(registry, folders, &line)
+        file.build_keeping(registry, self.folders(data.as_deref()), &line, kept)
             .map_err(|problems| problems.of_file(self.input.display().to_string()))
             .with_context(cannot)
+    }
+
+    /// Changes parameters as `--set` says.
+    fn change(&self, file: &mut SceneFile) -> anyhow::Result<()> {
+        let names: Vec<_> = (0..file.shapes.len()).map(|i| file.shape_name(i)).collect();
+        for setting in &self.set {
+            let (shape, parameter) = settings::shape_of(&setting.name, &names)?;
+            file.set_parameter(shape, parameter, &setting.value);
+        }
+        Ok(())
+    }
+
+    /// The files that a scene of this text names; `None` where it is none.
+    pub fn files(&self, text: &str) -> Option<SceneFiles> {
+        let mut file = SceneFile::parse(text).ok()?;
+        self.change(&mut file).ok()?;
+        Some(file.files(self.folders(self.data_folder().as_deref())))
+    }
+
+    /// The folders to which the paths in a scene are relative.
+    fn folders<'a>(&'a self, data: Option<&'a Path>) -> Folders<'a> {
+        Folders { base: self.input.parent().unwrap_or(Path::new("")), data }
     }
 
     /// The folder for paths that begin with `$VOLACT_DATA`.
