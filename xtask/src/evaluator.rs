@@ -92,7 +92,7 @@ fn registry() -> Result<Registry> {
     let mut entries = volact_shaders::builtin().map_err(|problems| anyhow::anyhow!("{problems}"))?;
     let root = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
     for file in ["shaders/depth_cue.ron", "shaders/marble.ron", "../examples/own_shader/edges.ron"] {
-        entries.push(volact_shaders::load(&root.join(file)).with_context(|| file.to_owned())?);
+        entries.push(volact_shaders::load(root.join(file)).with_context(|| file.to_owned())?);
     }
     for entry in entries {
         if registry.shaders().get(&entry.declaration.name).is_none() {

@@ -1,6 +1,5 @@
 //! From extinction to the opacity of a length, sixteen at once.
 #![expect(unsafe_code, reason = "kernels of a vector unit")]
-#![expect(clippy::needless_range_loop, reason = "a number indexes several arrays")]
 
 use super::{batch, field::sixteen};
 use crate::fast::{

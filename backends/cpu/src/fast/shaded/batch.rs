@@ -1,5 +1,4 @@
 //! A function of a shader over batches of samples of sixteen rays.
-#![expect(clippy::needless_range_loop, reason = "a lane indexes several arrays")]
 
 use std::sync::{Mutex, OnceLock, PoisonError};
 

@@ -1,6 +1,5 @@
 //! One component of a volume at places in local space, sixteen at once.
 #![expect(unsafe_code, reason = "kernels of a vector unit")]
-#![expect(clippy::needless_range_loop, reason = "a lane or axis indexes several arrays")]
 
 use volact_core::{
     Roi, VolumeTexture,

@@ -2,7 +2,6 @@
 //! by values in data units.
 
 #![expect(unsafe_code, reason = "kernels of a vector unit")]
-#![expect(clippy::needless_range_loop, reason = "a lane indexes several arrays")]
 
 use volact_core::table::ResolvedTable;
 
@@ -316,7 +315,7 @@ impl Segments {
     /// `length`: colour and extinction. NaN where a number is.
     pub fn medium(&self, [front, back, length]: [f32; 3]) -> [f32; 4] {
         let [front, back, length] = [front, back, length].map(f64::from);
-        if front.is_nan() || back.is_nan() || !(length > 0.0) {
+        if front.is_nan() || back.is_nan() || length.is_nan() || length <= 0.0 {
             return [f32::NAN; 4];
         }
         let (mut lane, mut cuts) = (Lane::default(), Vec::new());
