@@ -1,11 +1,11 @@
 //! Shapes whose shader is a text: its program is evaluated over batches of samples.
 //!
 //! The samples of sixteen rays in one chunk of the lattice, at most 512, are one batch
-//! ([`batch`]). Positions are made in f64 and are local from then on. The program asks its
+//! (`batch`). Positions are made in f64 and are local from then on. The program asks its
 //! `surroundings` for what volumes and tables say, sixteen positions at once. What comes of it is
-//! put together as the shader's compositing says: segments of a medium ([`dense`]) by the
-//! [`sweep`](super::sweep) over the whole scene, surfaces ([`crossings`]) as hits in it, values
-//! that are reduced along a ray ([`flat`]) as a picture of their own.
+//! put together as the shader's compositing says: segments of a medium (`dense`) by the
+//! [`sweep`](super::sweep) over the whole scene, surfaces (`crossings`) as hits in it, values
+//! that are reduced along a ray (`flat`) as a picture of their own.
 
 mod absorb;
 pub mod batch;
