@@ -109,9 +109,15 @@ impl<'a> Dense<'a> {
         }
         let (cuts, end) = (at.1, first + CHUNK as i64);
         let place = |k: f64| (k as i64 - first).clamp(0, CHUNK as i64) as usize;
-        let (from, to) = (cuts.from.map(place), cuts.to.map(place));
+        // Lanes that begin and end at rows.
+        let (mut begins, mut ends) = ([0u32; CHUNK + 1], [0u32; CHUNK + 1]);
+        for l in (0..LANES).filter(|l| cuts.from[*l] < cuts.to[*l] && done >> l & 1 == 0) {
+            begins[place(cuts.from[l])] |= 1 << l;
+            ends[place(cuts.to[l])] |= 1 << l;
+        }
+        let mut live = 0;
         for row in 0..CHUNK {
-            let live = (0..LANES).fold(0, |live, l| live | u32::from(from[l] <= row && row < to[l]) << l) & !done;
+            live = (live | begins[row]) & !ends[row];
             if live != 0 {
                 add(row, live);
             }

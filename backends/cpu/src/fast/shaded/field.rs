@@ -221,11 +221,16 @@ pub unsafe fn gradients<S: Simd>(field: &Field<'_>, p: Places<'_>, out: &mut [&m
         }
         for (c, row) in out.iter_mut().enumerate() {
             let Some(row) = row.get_mut(first..).and_then(<[f32]>::first_chunk_mut::<LANES>) else { continue };
+            // The transpose of the map to samples.
+            let mut column = field.linear.col(c).to_array();
+            let mut sum = [0f32; LANES];
             for l in 0..LANES {
-                // The transpose of the map to samples.
-                let column = field.slope(p, first + l).col(c);
-                row[l] = column.x * along[0][l] + column.y * along[1][l] + column.z * along[2][l];
+                if !p.maps.is_empty() {
+                    column = field.slope(p, first + l).col(c).to_array();
+                }
+                sum[l] = column[0] * along[0][l] + column[1] * along[1][l] + column[2] * along[2][l];
             }
+            *row = sum;
         }
     }
 }
