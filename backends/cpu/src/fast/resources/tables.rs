@@ -158,7 +158,7 @@ pub fn opaque(table: &ResolvedTable, units: Units) -> impl Fn(f32, f32) -> bool 
     move |lo, hi| {
         let [a, b] = [lo, hi].map(|v| units.data(f64::from(v)));
         // A little more, for what rounding of numbers may let in.
-        let wide = 1e-6 * (a.abs() + b.abs());
+        let wide = 1e-6 * [a, b].iter().filter(|v| v.is_finite()).map(|v| v.abs()).sum::<f64>();
         table.max_opacity(a.min(b) - wide, a.max(b) + wide) > 0.0
     }
 }

@@ -345,7 +345,7 @@ mod tests {
         let mut many: Vec<_> = (0..60).map(|i| point(f64::from(i), f64::from(i % 7) / 7.0)).collect();
         many.insert(30, point(30.0, 1.0));
         let faint = vec![point(0.0, 0.0), point(1.0, 1e-6), point(2.0, 1e-3), point(3.0, 0.999), point(4.0, 0.4)];
-        let soft = vec![point(-2.0, 0.0), point(0.0, 0.0), point(10.0, 0.3), point(12.5, 0.8), point(64.0, 0.0)];
+        let soft = vec![point(-2.0, 0.0), point(0.0, 0.0), point(10.0, 0.1), point(20.0, 0.3), point(62.0, 0.0)];
         assert!([&few, &many, &faint].iter().all(|points| {
             Baked::new(&LookupTable::from_points((*points).clone()).unwrap().resolve([0.0, 1.0]), 2.5).is_none()
         }));
