@@ -5,7 +5,8 @@ use std::time::Instant;
 
 use anyhow::Result;
 use volact_core::{
-    Appearance, ControlPoint, FrameDesc, LookupTable, Options, Registry, ScalarType, Shape, View, Volume, VolumeDesc,
+    Aabb, Appearance, Clip, ClipRegion, ControlPoint, FrameDesc, LookupTable, Options, Plane, Registry, ScalarType,
+    Shape, Sphere, View, Volume, VolumeDesc,
     glam::{DAffine3, DVec3},
 };
 
@@ -64,12 +65,25 @@ fn ways(registry: &Registry) -> Result<()> {
     let simple = shape.named("simple");
     simple.set_shader("simple");
     simple.set_parameter("unit_distance", 100.0);
+    let middle = DVec3::splat(128.0);
+    let clipped = |name: &str, region: ClipRegion| {
+        let clipped = shape.named(name);
+        clipped.set_clip(Clip::new([region]));
+        clipped
+    };
+    let plane = clipped("plane", ClipRegion::plane(Plane::new(middle, DVec3::ONE)?));
+    let hole = clipped("hole", ClipRegion::crop(Aabb::new(middle * 0.6, middle * 1.4)).cut());
+    let ball = shape.named("ball");
+    ball.set_geometry(Sphere::new(middle, 110.0, 32)?);
     let scenes = [
         ("one shape", vec![shape.clone()]),
         ("the same, classified in the middle of segments", vec![shape.clone()]),
         ("two shapes apart", vec![shape.clone(), apart]),
         ("two shapes that overlap by half", vec![shape.clone(), other()?]),
         ("three in the same place", vec![shape.clone(), shape.named("second"), shape.named("third")]),
+        ("one shape behind a plane", vec![plane]),
+        ("one shape with a hole", vec![hole]),
+        ("one shape carved by a ball of flat faces", vec![ball]),
         ("one shape, pre-interpolated table", vec![pre]),
         ("one shape, shader `simple`", vec![simple]),
     ];

@@ -13,5 +13,3 @@ mod agreement;
 mod depths;
 #[path = "fast/life.rs"]
 mod life;
-#[path = "fast/speed.rs"]
-mod speed;

@@ -192,6 +192,25 @@ fn the_same_bits_on_any_number_of_threads_and_after_changes() {
 }
 
 #[test]
+fn only_what_changed_is_made_anew() {
+    let shape = by_source(&lut(&ball([9, 8, 10], ScalarType::U8), warm(), 1.0), "own");
+    let (all, setup) = (own(), Setup::post(0.2));
+    let mut action = setup.action_in(&all);
+    let shapes = [shape];
+    let mut anew = || -> Vec<String> {
+        let frame = draw(&mut *action, &shapes, &view()).unwrap();
+        frame.statistics.rebuilt.into_iter().map(|made| made.what).collect()
+    };
+    assert!(anew().contains(&"shader".to_owned()));
+    assert_eq!(anew(), Vec::<String>::new());
+    shapes[0].set_parameter("lookup_table", greys(&[(0.0, 1.0, 0.3)]));
+    assert_eq!(anew(), ["classification"]);
+    assert_eq!(anew(), Vec::<String>::new());
+    shapes[0].set_transform(DAffine3::from_rotation_x(0.3));
+    assert_eq!(anew(), ["shader"]);
+}
+
+#[test]
 fn what_is_no_number_is_transparent() {
     let text = "fn shade(s: Sample) -> Medium { let v = volume(s.position); return Medium(vec3<f32>(v), 1e3 * v); }";
     let all = with(&[("plain", vec![needs("volume", ParameterType::Volume)], text)]);

@@ -341,15 +341,15 @@ impl Resources {
         settings: &Settings,
         say: &mut impl FnMut(&str, usize),
     ) -> Result<(), ActionError> {
-        let kept = self.shaders.remove(&shape.id).filter(|kept| kept.serves(shape, settings.classification));
-        let shader = match kept {
-            Some(kept) => kept,
-            None => {
-                let made = Shader::new(shape, settings.classification)?;
+        let mut shader = match self.shaders.remove(&shape.id) {
+            Some(kept) if kept.serves(shape, settings.classification) => kept,
+            last => {
+                let made = Shader::new(shape, settings.classification, last)?;
                 say("shader", made.bytes());
                 made
             }
         };
+        shader.prepare_tables(shape, &mut *say);
         self.prepare_vacant(shape, &shader, settings, say);
         self.shaders.insert(shape.id, shader);
         Ok(())

@@ -118,7 +118,7 @@ impl<'a> Evaluator<'a> {
             kernel,
             inputs: kernel.inputs().collect(),
             origin: shader.origin,
-            surroundings: Surroundings::new(shape, kernel.functions(), shader.origin, unit),
+            surroundings: Surroundings::new(shape, shader, kernel.functions(), unit),
             attributes: parameters.iter().map(|p| attribute(&p.name)).collect(),
             component: super::component(shape),
             of_segments: entry == Entry::Segment,

@@ -156,6 +156,13 @@ impl Lookup {
         Self { values, lines, anchors, bins, low, scale, unit, baked: Baked::new(table, unit) }
     }
 
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        let baked = self.baked.as_ref().map_or(0, |baked| size_of_val(baked.nodes.as_slice()));
+        let points = size_of_val(self.lines.as_slice()) + 4 * (self.values.len() + self.anchors.len());
+        baked + points + size_of_val(self.bins.as_slice())
+    }
+
     /// How many control points are not above sixteen values.
     ///
     /// # Safety

@@ -19,15 +19,20 @@ mod skip;
 mod surroundings;
 pub mod trail;
 
-use std::sync::Arc;
+use std::{collections::BTreeMap, sync::Arc};
 
 use volact_core::{
-    ActionError, Compositing, ParameterType, ParameterValue, ShaderEntry, SliceStyle, TableInterpolation,
+    ActionError, Compositing, LookupTable, ParameterType, ParameterValue, ShaderEntry, SliceStyle, TableInterpolation,
+    VolumeTexture,
     glam::{DAffine3, DVec3},
     parameter::ParameterMap,
     resolve::ResolvedShape,
 };
-use volact_shaders::{Entry, Kernel, Program, eval::Uniforms, signatures::Derived};
+use volact_shaders::{
+    Entry, Kernel, Program,
+    eval::{Function, Uniforms},
+    signatures::Derived,
+};
 
 use super::options::Classification;
 pub use absorb::{absorb, composite};
@@ -35,6 +40,7 @@ pub use chosen::Chosen;
 pub use crossings::Crossings;
 pub use dense::Dense;
 pub use flat::Flattened;
+use lookup::Lookup;
 pub use skip::{Rows, Skip, visible};
 
 /// Whether a shape is drawn by evaluating its shader's source.
@@ -88,6 +94,13 @@ pub fn refused(shape: &ResolvedShape) -> Option<(String, String)> {
     })
 }
 
+/// The table of a parameter and the range that it is taken over: a grey one where it was left out.
+fn table_of(shape: &ResolvedShape, name: &str) -> (LookupTable, [f64; 2]) {
+    let range = shape.first_volume().map_or([0.0, 1.0], VolumeTexture::range);
+    let grey = || LookupTable::grey([range[0].min(range[1]), range[0].max(range[1])]);
+    (shape.table(name).cloned().unwrap_or_else(grey), range)
+}
+
 /// A shape's shader, ready to be evaluated.
 #[derive(Debug)]
 pub struct Shader {
@@ -97,11 +110,24 @@ pub struct Shader {
     /// The point of the world that is the origin of local space.
     origin: DVec3,
     entry: Arc<ShaderEntry>,
+    program: Program,
     classification: Classification,
     uniforms: ParameterMap,
     transform: DAffine3,
     /// What voxels depend on: distances between samples are uniform, too.
     volumes: Vec<u64>,
+    /// Tables that it looks up in, by parameter.
+    tables: BTreeMap<String, Table>,
+}
+
+/// A table as programs look it up, and what that depends on.
+#[derive(Debug)]
+struct Table {
+    /// The table's identity; `None` for the grey one of a parameter that was left out.
+    id: Option<u64>,
+    range: [f64; 2],
+    unit: f64,
+    lookup: Lookup,
 }
 
 /// The parameters that are the same for every sample.
@@ -120,14 +146,17 @@ fn volumes(shape: &ResolvedShape) -> Vec<u64> {
 }
 
 impl Shader {
-    /// Compiles the shader of a shape.
+    /// Compiles the shader of a shape; what served before gives what is still good of it.
     ///
     /// # Errors
     /// [`ActionError::Shader`] if its source is wrong.
-    pub fn new(shape: &ResolvedShape, classification: Classification) -> Result<Self, ActionError> {
+    pub fn new(shape: &ResolvedShape, classification: Classification, last: Option<Self>) -> Result<Self, ActionError> {
         let wrong =
             |e: volact_shaders::ShaderError| ActionError::Shader { shape: shape.name.clone(), source: e.into() };
-        let program = Program::new(&shape.shader).map_err(wrong)?;
+        let (program, tables) = match last.filter(|last| last.entry == shape.shader) {
+            Some(last) => (last.program, last.tables),
+            None => (Program::new(&shape.shader).map_err(wrong)?, BTreeMap::new()),
+        };
         let (transform, bounds) = (shape.state.transform, shape.world_block());
         let origin = bounds.center();
         let given = Uniforms { parameters: &shape.parameters, object_to_world: transform, origin };
@@ -140,10 +169,12 @@ impl Shader {
             segment: optional(Entry::Segment, over && classification != Classification::Post)?,
             origin,
             entry: Arc::clone(&shape.shader),
+            program,
             classification,
             uniforms: uniforms(shape),
             transform,
             volumes: volumes(shape),
+            tables,
         })
     }
 
@@ -157,10 +188,38 @@ impl Shader {
             && self.volumes == volumes(shape)
     }
 
+    fn kernels(&self) -> impl Iterator<Item = &Kernel<f32>> {
+        [Some(&self.shade), self.value.as_ref(), self.segment.as_ref()].into_iter().flatten()
+    }
+
     /// Bytes held, about.
     pub fn bytes(&self) -> usize {
-        let kernels = [Some(&self.shade), self.value.as_ref(), self.segment.as_ref()];
-        kernels.into_iter().flatten().map(|k| k.instructions() * 32).sum()
+        let tables = self.tables.values().map(|table| table.lookup.bytes());
+        self.kernels().map(|k| k.instructions() * 32).sum::<usize>() + tables.sum::<usize>()
+    }
+
+    /// Makes the tables that it looks up in ready, as far as they changed; says so.
+    pub fn prepare_tables(&mut self, shape: &ResolvedShape, mut say: impl FnMut(&str, usize)) {
+        let of = |function: &Function| matches!(function.derived, Derived::Medium | Derived::TableColor);
+        let asked = self.kernels().flat_map(|kernel| kernel.functions()).filter(|f| of(f)).map(|f| f.parameter);
+        let parameters = &self.entry.declaration.parameters;
+        let names: Vec<String> = asked.filter_map(|i| Some(parameters.get(i)?.name.clone())).collect();
+        self.tables.retain(|name, _| names.contains(name));
+        for name in names {
+            let (table, range) = table_of(shape, &name);
+            let (id, unit) = (shape.table(&name).map(LookupTable::id), shape.float("unit_distance").unwrap_or(1.0));
+            let same = |kept: &Table| (kept.id, kept.range, kept.unit) == (id, range, unit);
+            if !self.tables.get(&name).is_some_and(same) {
+                let lookup = Lookup::new(&table.resolve(range), unit);
+                say("classification", lookup.bytes());
+                self.tables.insert(name, Table { id, range, unit, lookup });
+            }
+        }
+    }
+
+    /// The table of a parameter, ready to be looked up in.
+    fn lookup(&self, name: &str) -> Option<&Lookup> {
+        self.tables.get(name).map(|table| &table.lookup)
     }
 
     /// Whether segments are classified by both of their ends.
@@ -171,9 +230,8 @@ impl Shader {
     /// The parameters of a volume and a table such that the medium is transparent wherever the
     /// table is at the volume's value.
     pub fn transparent_with(&self) -> Option<[&str; 2]> {
-        let kernels = [Some(&self.shade), self.segment.as_ref()];
         // The ends of a segment say nothing of what lies between.
-        let kernel = kernels[0].filter(|_| self.segment.is_none())?;
+        let kernel = Some(&self.shade).filter(|_| self.segment.is_none())?;
         let (volume, table) = kernel.transparent_with()?;
         let parameters = &self.entry.declaration.parameters;
         let name = |i: usize| {

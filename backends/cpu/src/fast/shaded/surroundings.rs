@@ -1,16 +1,13 @@
 //! What programs ask for: volumes at places in local space, and tables.
 
-use volact_core::{
-    LookupTable, ParameterValue, VolumeTexture,
-    glam::{DAffine3, DVec3},
-    resolve::ResolvedShape,
-    volume::Components,
-};
+use volact_core::{ParameterValue, glam::DAffine3, resolve::ResolvedShape, volume::Components};
 use volact_shaders::{Environment, eval::Function, signatures::Derived};
 
 use super::{
+    Shader,
     field::{Field, Places},
     lookup::{Lookup, Segments},
+    table_of,
 };
 use crate::fast::{dispatch, simd::Unit};
 
@@ -30,8 +27,8 @@ enum Answer<'a> {
     Gradient(Field<'a>),
     Inside(Field<'a>),
     Coordinates(Field<'a>),
-    Medium(Lookup),
-    Color4(Lookup),
+    Medium(&'a Lookup),
+    Color4(&'a Lookup),
     /// The table in f64, and its unit distance.
     Segment(Segments),
     /// A volume that was left out.
@@ -40,9 +37,9 @@ enum Answer<'a> {
 
 impl<'a> Surroundings<'a> {
     /// What a shape's program asks for.
-    pub fn new(shape: &'a ResolvedShape, functions: &[Function], origin: DVec3, unit: Unit) -> Self {
-        let local = shape.to_object * DAffine3::from_translation(origin);
-        let answers = functions.iter().map(|f| answer(shape, *f, &local, unit)).collect();
+    pub fn new(shape: &'a ResolvedShape, shader: &'a Shader, functions: &[Function], unit: Unit) -> Self {
+        let local = shape.to_object * DAffine3::from_translation(shader.origin);
+        let answers = functions.iter().map(|f| answer(shape, shader, *f, &local, unit)).collect();
         Self { unit, answers }
     }
 
@@ -59,9 +56,15 @@ pub struct Asked<'s, 'a> {
     maps: &'s [DAffine3],
 }
 
-fn answer<'a>(shape: &'a ResolvedShape, function: Function, local: &DAffine3, unit: Unit) -> Answer<'a> {
-    let name = shape.shader.declaration.parameters.get(function.parameter).map(|p| p.name.as_str());
-    match name.and_then(|name| shape.parameters.get(name)) {
+fn answer<'a>(
+    shape: &'a ResolvedShape,
+    shader: &'a Shader,
+    function: Function,
+    local: &DAffine3,
+    unit: Unit,
+) -> Answer<'a> {
+    let parameter = shape.shader.declaration.parameters.get(function.parameter);
+    match parameter.and_then(|p| shape.parameters.get(&p.name)) {
         Some(ParameterValue::Volume(texture)) => {
             let component = shape.int("component").unwrap_or(0).clamp(0, 3) as usize;
             let field = |c| Field::new(texture, c, local, unit);
@@ -79,23 +82,21 @@ fn answer<'a>(shape: &'a ResolvedShape, function: Function, local: &DAffine3, un
                 _ => Answer::Nothing,
             }
         }
-        Some(ParameterValue::Table(table)) => classified(shape, table, function.derived),
-        // A table that was left out is grey.
-        None if matches!(function.derived, Derived::Medium | Derived::TableColor | Derived::Segment) => {
-            let [a, b] = shape.first_volume().map_or([0.0, 1.0], VolumeTexture::range);
-            classified(shape, &LookupTable::grey([a.min(b), a.max(b)]), function.derived)
-        }
-        _ => Answer::Nothing,
+        _ => parameter.and_then(|p| classified(shape, shader, &p.name, function.derived)).unwrap_or(Answer::Nothing),
     }
 }
 
-fn classified<'a>(shape: &ResolvedShape, table: &LookupTable, derived: Derived) -> Answer<'a> {
-    let range = shape.first_volume().map_or([0.0, 1.0], VolumeTexture::range);
-    let (table, unit) = (table.resolve(range), shape.float("unit_distance").unwrap_or(1.0));
+/// What a table says; `None` for what is no table's function.
+fn classified<'a>(shape: &ResolvedShape, shader: &'a Shader, name: &str, derived: Derived) -> Option<Answer<'a>> {
     match derived {
-        Derived::Segment => Answer::Segment(Segments { table, unit }),
-        Derived::TableColor => Answer::Color4(Lookup::new(&table, unit)),
-        _ => Answer::Medium(Lookup::new(&table, unit)),
+        Derived::Medium => shader.lookup(name).map(Answer::Medium),
+        Derived::TableColor => shader.lookup(name).map(Answer::Color4),
+        Derived::Segment => {
+            let (table, range) = table_of(shape, name);
+            let unit = shape.float("unit_distance").unwrap_or(1.0);
+            Some(Answer::Segment(Segments { table: table.resolve(range), unit }))
+        }
+        _ => None,
     }
 }
 
