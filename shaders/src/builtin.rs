@@ -85,17 +85,17 @@ const NATIVE: [(Native, &str); 7] = [
 /// Which of these a program is: the same parameters, compositing and instructions, whatever it is
 /// called and however it is written. `None` for all others, and where recognition is off.
 pub fn recognise(program: &Program, on: bool) -> Option<Native> {
-    let candidates = NATIVE.iter().filter(|_| on);
-    let own = shape(program)?;
-    candidates
-        .filter_map(|(native, name)| Some((*native, SHIPPED.iter().find(|(n, ..)| n == name)?)))
-        .find(|(_, shipped)| {
-            // Most differ by what can be compared without a parser.
-            let entry = read(shipped).ok().filter(|entry| alike(program, entry));
-            let other = entry.and_then(|entry| Program::new(&entry).ok());
-            other.is_some_and(|other| shape(&other).is_some_and(|other| same(&own, &other)))
-        })
-        .map(|(native, _)| native)
+    NATIVE.iter().find(|(_, name)| on && does(program, name)).map(|(native, _)| *native)
+}
+
+/// Whether a program does what the built-in shader of a name does: the same parameters, compositing
+/// and instructions.
+pub fn does(program: &Program, name: &str) -> bool {
+    // Most differ by what can be compared without a parser.
+    let shipped = SHIPPED.iter().find(|(n, ..)| *n == name).and_then(|shipped| read(shipped).ok());
+    let other = shipped.filter(|entry| alike(program, entry)).and_then(|entry| Program::new(&entry).ok());
+    let shapes = other.and_then(|other| Some((shape(program)?, shape(&other)?)));
+    shapes.is_some_and(|(own, other)| same(&own, &other))
 }
 
 fn alike(program: &Program, entry: &ShaderEntry) -> bool {
@@ -113,7 +113,7 @@ type Shape = Vec<(Entry, Kernel<f32>, Vec<(String, Function)>)>;
 fn shape(program: &Program) -> Option<Shape> {
     let entries = [Entry::Shade, Entry::Segment, Entry::Value].into_iter().filter(|entry| program.has(*entry));
     let shape = |entry| {
-        let kernel = lower::<f32>(program, entry, None).ok()?;
+        let kernel = lower::<f32>(program, entry, None, false).ok()?;
         let name = |f: &Function| program.declaration().parameters.get(f.parameter).map(|p| (p.name.clone(), *f));
         let functions = kernel.functions().iter().map(name).collect::<Option<Vec<_>>>()?;
         Some((entry, kernel, functions))

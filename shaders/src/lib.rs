@@ -22,7 +22,7 @@ pub mod signatures;
 pub mod source;
 mod tokens;
 
-pub use builtin::{Native, builtin, recognise};
+pub use builtin::{Native, builtin, does, recognise};
 pub use error::{ShaderError, SourceError, SourceErrors};
 pub use eval::{Environment, Kernel, Machine};
 pub use program::{Entry, Program};

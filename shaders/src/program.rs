@@ -181,7 +181,7 @@ fn check_source(declaration: &Declaration, compositing: Compositing, source: &Sh
     let program = Program(Arc::new(Inner { declaration, compositing, module, info, stubs, entries }));
     // What is too large to be evaluated anywhere is said now, and not when a shape is drawn.
     for (entry, _) in &program.0.entries {
-        crate::eval::lower::<f32>(&program, *entry, None).map_err(|error| vec![error.shifted(start)])?;
+        crate::eval::lower::<f32>(&program, *entry, None, false).map_err(|error| vec![error.shifted(start)])?;
     }
     Ok(program)
 }

@@ -4,7 +4,7 @@ mod common;
 
 use common::{entry, required, uniforms};
 use volact_core::{Compositing, ParameterType, ParameterValue, parameter::ParameterMap};
-use volact_shaders::{Entry, Kernel, Program, builtin, eval::Uniforms, signatures::Derived};
+use volact_shaders::{Entry, Kernel, Program, builtin, eval::Uniforms};
 
 fn parameters() -> Vec<volact_core::ParameterDecl> {
     vec![
@@ -26,10 +26,12 @@ fn found(text: &str) -> Option<[String; 2]> {
 
 fn names(program: &Program, given: &Uniforms<'_>) -> Option<[String; 2]> {
     let kernel = Kernel::<f32>::new(program, Entry::Shade, given).unwrap_or_else(|e| panic!("{e}"));
-    let (volume, table) = kernel.transparent_with()?;
-    let function = |i: usize| kernel.functions()[i];
-    assert!(function(volume).derived == Derived::Value);
-    Some([volume, table].map(|i| program.declaration().parameters[function(i).parameter].name.clone()))
+    let found = kernel.transparent_with();
+    // It is the same where values are inputs.
+    let kernel = Kernel::<f32>::with_values(program, Entry::Shade, given).unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!(kernel.transparent_with(), found);
+    let (volume, table) = found?;
+    Some([volume, table].map(|i| program.declaration().parameters[i].name.clone()))
 }
 
 #[test]

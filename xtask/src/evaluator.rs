@@ -23,6 +23,9 @@ pub struct Args {
     /// Frames of each, in turn; the median counts.
     #[arg(long, default_value_t = 9)]
     frames: usize,
+    /// Only those whose name contains this, beside the kernel.
+    #[arg(long)]
+    only: Option<String>,
     /// The document whose marked part is replaced; without, the table is printed.
     #[arg(long)]
     report: Option<PathBuf>,
@@ -35,6 +38,12 @@ struct Case {
     action: Box<dyn RenderAction>,
     times: Vec<f64>,
     samples: u64,
+}
+
+impl Args {
+    fn names(&self, case: &Case) -> bool {
+        self.only.as_ref().is_none_or(|part| case.name.contains(part.as_str()))
+    }
 }
 
 /// Runs it.
@@ -50,7 +59,7 @@ pub fn run(args: &Args) -> Result<()> {
         let action = registry.action("cpu", &options)?;
         Ok(Case { name, shape, action, times: Vec::new(), samples: 0 })
     };
-    let mut cases = [
+    let cases = [
         case("kernel of `lut`", "lut", true)?,
         case("source of `lut`", "lut", false)?,
         case("`tangent_space`", "tangent_space", true)?,
@@ -59,6 +68,8 @@ pub fn run(args: &Args) -> Result<()> {
         case("own: edges", "edges", true)?,
         case("own: four octaves of noise", "marble", true)?,
     ];
+    let mut cases: Vec<Case> =
+        cases.into_iter().enumerate().filter(|(i, c)| *i == 0 || args.names(c)).map(|(_, c)| c).collect();
     for case in &mut cases {
         case.action.manage(&case.shape)?;
     }

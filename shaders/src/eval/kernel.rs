@@ -30,6 +30,9 @@ pub enum Field {
     Attribute(usize),
     /// Component of an attribute: parameter, component.
     AttributeComponent(usize, u8),
+    /// The value of a volume at the sample's own position: parameter. Only of kernels
+    /// [`with_values`](Kernel::with_values).
+    Volume(usize),
 }
 
 /// A number that a kernel reads.
@@ -70,7 +73,17 @@ impl<F: Real> Kernel<F> {
     /// # Errors
     /// If the program has no such function, or what is left of it is too large.
     pub fn new(program: &Program, entry: Entry, uniforms: &Uniforms) -> Result<Self, ShaderError> {
-        super::lower(program, entry, Some(uniforms)).map_err(|error| error.of(program))
+        super::lower(program, entry, Some(uniforms), false).map_err(|error| error.of(program))
+    }
+
+    /// The same, but the values of volumes at samples' own positions are inputs
+    /// ([`Field::Volume`]), where every sample has them: whoever walks along rays can have them at
+    /// hand.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn with_values(program: &Program, entry: Entry, uniforms: &Uniforms) -> Result<Self, ShaderError> {
+        super::lower(program, entry, Some(uniforms), true).map_err(|error| error.of(program))
     }
 
     /// What it reads of each sample, in the order in which [`Machine::run`](super::Machine::run)

@@ -105,9 +105,28 @@ impl<'k, F: Real> Machine<'k, F> {
         for ((_, reg), row) in self.kernel.inputs.iter().zip(inputs) {
             self.floats[*reg as usize][..samples].copy_from_slice(row);
         }
-        self.samples = samples;
-        self.counts[..samples].fill(0);
+        self.run_in_place(samples, environment)
+    }
+
+    /// Evaluates a batch of `samples`, at most [`BATCH`], whose numbers were written into
+    /// [`inputs`](Self::inputs) since the last batch: rows are used again for what is computed.
+    ///
+    /// # Errors
+    /// If a sample's loops exceed the budget.
+    pub fn run_in_place(&mut self, samples: usize, environment: &mut dyn Environment<F>) -> Result<(), Overrun> {
+        self.samples = samples.min(BATCH);
+        self.counts[..self.samples].fill(0);
         dispatch(self, environment)
+    }
+
+    /// Rows of [`BATCH`] numbers of inputs, by their place in [`Kernel::inputs`]; `None` where one is
+    /// not there, or there twice.
+    pub fn inputs<const N: usize>(&mut self, at: [usize; N]) -> Option<[&mut [F]; N]> {
+        let mut rows = [0; N];
+        for (row, at) in rows.iter_mut().zip(at) {
+            *row = self.kernel.inputs.get(at)?.1 as usize;
+        }
+        self.floats.get_disjoint_mut(rows).ok().map(|rows| rows.map(Vec::as_mut_slice))
     }
 
     /// The numbers that the last batch gave: of a medium red, green, blue and extinction.

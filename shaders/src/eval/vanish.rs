@@ -21,23 +21,23 @@ enum Known {
     Zero,
     /// A component of the sample's own position.
     Position(u8),
-    /// The value at the sample's own position, by the number of the function.
-    Value(u32),
-    /// Zero, or not a number, wherever that table (the second) is transparent at that value.
-    Vanishes(u32, u32),
+    /// The value of a volume at the sample's own position, by parameter.
+    Value(usize),
+    /// Zero, or not a number, wherever that table (the second) is transparent at that volume's value.
+    Vanishes(usize, usize),
 }
 
 impl<F: Real> Kernel<F> {
-    /// The functions of a volume's value and of a table's medium (by their numbers in
-    /// [`functions`](Self::functions)) such that this medium's extinction is zero, or not a number,
-    /// wherever the table's is zero at the volume's value at the sample's position. `None` where
-    /// none are known.
+    /// The parameters of a volume and a table such that this medium's extinction is zero, or not a
+    /// number, wherever the table's is zero at the volume's value at the sample's position. `None`
+    /// where none are known.
     pub fn transparent_with(&self) -> Option<(usize, usize)> {
         let mut known: BTreeMap<Reg, Known> = BTreeMap::new();
         known
             .extend(self.float_constants.iter().filter(|(_, v)| v.to_f64() == 0.0).map(|(reg, _)| (*reg, Known::Zero)));
         known.extend(self.inputs.iter().filter_map(|(input, reg)| match input.field {
             Field::Position(axis) if input.sample == 0 => Some((*reg, Known::Position(axis))),
+            Field::Volume(parameter) if input.sample == 0 => Some((*reg, Known::Value(parameter))),
             _ => None,
         }));
         // What may be jumped over leaves rows as they were; in loops nothing is followed.
@@ -60,7 +60,7 @@ impl<F: Real> Kernel<F> {
             }
         }
         match known.get(self.outputs.get(3)?)? {
-            Known::Vanishes(value, table) => Some((*value as usize, *table as usize)),
+            Known::Vanishes(value, table) => Some((*value, *table)),
             _ => None,
         }
     }
@@ -99,17 +99,17 @@ impl<F: Real> Kernel<F> {
         results: &[Option<Reg>],
         of: &dyn Fn(&Reg) -> Option<Known>,
     ) -> Vec<(Reg, Known)> {
-        let derived = self.functions.get(function as usize).map(|f| f.derived);
+        let asked = self.functions.get(function as usize);
         let here = arguments.len() == 3 && (0..3u8).zip(arguments).all(|(a, reg)| of(reg) == Some(Known::Position(a)));
         let value = |i: usize| match arguments.get(i).and_then(of) {
             Some(Known::Value(value)) => Some(value),
             _ => None,
         };
         let place = |i: usize, known| results.get(i).copied().flatten().map(|reg| (reg, known)).into_iter().collect();
-        match derived {
-            Some(Derived::Value) if here => place(0, Known::Value(function)),
-            Some(Derived::Medium | Derived::TableColor) if value(0).is_some() => {
-                value(0).map_or_else(Vec::new, |value| place(3, Known::Vanishes(value, function)))
+        match asked.map(|f| (f.derived, f.parameter)) {
+            Some((Derived::Value, volume)) if here => place(0, Known::Value(volume)),
+            Some((Derived::Medium | Derived::TableColor, table)) => {
+                value(0).map_or_else(Vec::new, |value| place(3, Known::Vanishes(value, table)))
             }
             _ => Vec::new(),
         }

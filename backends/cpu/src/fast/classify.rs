@@ -29,6 +29,17 @@ impl Units {
         number * self.scale + self.offset
     }
 
+    /// Whether what is fetched is in data units.
+    pub fn are_stored(&self) -> bool {
+        self.scale == 1.0 && self.offset == 0.0
+    }
+
+    /// Numbers to data units, in place.
+    #[inline(always)]
+    pub fn apply(&self, numbers: &mut [f32]) {
+        numbers.iter_mut().for_each(|v| *v = self.data(f64::from(*v)) as f32);
+    }
+
     /// From data units.
     pub fn number(&self, data: f64) -> f64 {
         (data - self.offset) / self.scale

@@ -15,6 +15,7 @@ use super::{
         lookup::{self, Lookup},
     },
     simd::{LANES, Plain, Simd, Unit},
+    slopes::Slopes,
     sweep::{
         gather::{self, Chunk, Row},
         merge::{self, Rows, Sights},
@@ -205,6 +206,24 @@ by_unit! {
     S => numbers_by::<S>(voxels, base, local, out)
 }
 
+#[inline(always)]
+unsafe fn slopes_by<S: Simd>(voxels: &Voxels<'_>, base: &Base, local: &Local, out: &mut Local) {
+    // SAFETY: the caller's promises.
+    unsafe {
+        let p = [S::load(&local[0]), S::load(&local[1]), S::load(&local[2])];
+        let slopes = by_access!(voxels.access(), F => F::slopes::<S>(voxels, base, p));
+        for a in 0..3 {
+            S::store(slopes[a], &mut out[a]);
+        }
+    }
+}
+
+by_unit! {
+    /// By axis, the numbers one voxel after positions relative to a base minus those one before.
+    slopes(voxels: &Voxels<'_>, base: &Base, local: &Local, out: &mut Local),
+    S => slopes_by::<S>(voxels, base, local, out)
+}
+
 by_unit! {
     /// Gathers a chunk of one stretch; returns the next segment in which there may be something.
     gather(
@@ -262,16 +281,82 @@ by_unit! {
 }
 
 by_unit! {
+    /// Lit media at values and places, seen along directions.
+    lit(of: &shaded::Lit<'_>, values: &[f32], places: [&[f32]; 3], along: &[Lanes; 3], out: &mut [Vec<f32>; 4]),
+    S => shaded::lit::<S>(of, values, places, along, out)
+}
+
+#[cfg(test)]
+#[inline(always)]
+unsafe fn power_by<S: Simd>(numbers: &[f32; LANES], exponent: f32, out: &mut [f32; LANES]) {
+    // SAFETY: the caller's promises.
+    unsafe { S::store(super::power::power::<S>(S::load(numbers), exponent), out) }
+}
+
+#[cfg(test)]
+by_unit! {
+    /// Numbers of 0 to 1 to a power.
+    power(numbers: &[f32; LANES], exponent: f32, out: &mut [f32; LANES]),
+    S => power_by::<S>(numbers, exponent, out)
+}
+
+by_unit! {
     /// What lengths of sixteen media add: red, green, blue and extinction by lane.
     absorb(medium: &[&[f32; LANES]; 4], length: f32, out: &mut Row),
     S => shaded::absorb::<S>(medium, length, out)
 }
 
+#[inline(always)]
+unsafe fn visible_by<S: Simd>(
+    skip: &Skip<'_>,
+    at: (&Packet, &Cuts),
+    place: (f64, i64),
+    done: u32,
+    found: &mut shaded::Rows,
+    counts: &mut Counts,
+) -> i64 {
+    // SAFETY: the caller's promises.
+    by_access!(skip.voxels.access(), F => unsafe { shaded::visible::<S, F>(skip, at, place, done, found, counts) })
+}
+
 by_unit! {
-    /// Finds the rows of a chunk in which a program may be seen; returns the next segment in which
+    /// Finds the rows of a chunk in which a program may be seen, and values there; returns the next segment in which
     /// there may be something.
-    visible(skip: &Skip<'_>, at: (&Packet, &Cuts), place: (f64, i64), done: u32, found: &mut shaded::Rows) -> i64,
-    S => shaded::visible::<S>(skip, at, place, done, found)
+    visible(
+        skip: &Skip<'_>,
+        at: (&Packet, &Cuts),
+        place: (f64, i64),
+        done: u32,
+        found: &mut shaded::Rows,
+        counts: &mut Counts
+    ) -> i64,
+    S => visible_by::<S>(skip, at, place, done, found, counts)
+}
+
+#[inline(always)]
+unsafe fn visit_by<S: Simd>(
+    skip: &Skip<'_>,
+    at: (&Packet, &Cuts),
+    step: f64,
+    done: u32,
+    (found, take): (&mut shaded::Rows, &mut shaded::Take<'_>),
+    counts: &mut Counts,
+) {
+    // SAFETY: the caller's promises.
+    by_access!(skip.voxels.access(), F => unsafe { shaded::visit::<S, F>(skip, at, step, done, (found, take), counts) })
+}
+
+by_unit! {
+    /// Visits the rows of a packet in which a program may be seen, chunk by chunk, with values there.
+    visit(
+        skip: &Skip<'_>,
+        at: (&Packet, &Cuts),
+        step: f64,
+        done: u32,
+        to: (&mut shaded::Rows, &mut shaded::Take<'_>),
+        counts: &mut Counts
+    ),
+    S => visit_by::<S>(skip, at, step, done, to, counts)
 }
 
 by_unit! {

@@ -159,17 +159,57 @@ unsafe fn cell<S: Simd>(p: S::F, lo: f32, hi: f32) -> (S::F, S::F) {
 }
 
 /// a + t·(b − a).
+///
+/// # Safety
+/// The contract of [`Simd`].
 #[inline(always)]
-unsafe fn lerp<S: Simd>(a: S::F, b: S::F, t: S::F) -> S::F {
+pub unsafe fn lerp<S: Simd>(a: S::F, b: S::F, t: S::F) -> S::F {
     // SAFETY: the caller keeps the unit's contract.
     unsafe { S::fma(t, S::sub(b, a), a) }
 }
 
 /// As `lerp`, but `a` alone where `t` is 0: a NaN without weight does not count.
+///
+/// # Safety
+/// The contract of [`Simd`].
 #[inline(always)]
-unsafe fn lerp_nan<S: Simd>(a: S::F, b: S::F, t: S::F) -> S::F {
+pub unsafe fn lerp_nan<S: Simd>(a: S::F, b: S::F, t: S::F) -> S::F {
     // SAFETY: the caller keeps the unit's contract.
     unsafe { S::where_zero(t, a, lerp::<S>(a, b, t)) }
+}
+
+/// Bytes from row to row and from slab to slab.
+#[inline(always)]
+pub fn strides(voxels: &Voxels<'_>, size: i32) -> [i32; 2] {
+    let row = (voxels.dims[0] as i32).wrapping_mul(size);
+    [row, row.wrapping_mul(voxels.dims[1] as i32)]
+}
+
+/// Byte offsets of voxels, relative to the base's.
+///
+/// # Safety
+/// The contract of [`Simd`].
+#[inline(always)]
+pub unsafe fn offset<S: Simd>(voxels: &Voxels<'_>, [x, y, z]: [S::F; 3], size: i32) -> S::I {
+    // SAFETY: the caller keeps the unit's contract.
+    unsafe {
+        if voxels.small {
+            // Offsets in voxels stay below 2²⁴: exact in f32, and cheaper than integer products.
+            let row = S::splat(voxels.dims[0] as f32);
+            let slab = S::splat((voxels.dims[0] * voxels.dims[1]) as f32);
+            let start = S::to_int(S::fma(z, slab, S::fma(y, row, x)));
+            return match size {
+                1 => start,
+                2 => S::shl::<1>(start),
+                _ => S::shl::<2>(start),
+            };
+        }
+        let ([row, slab], (x, y, z)) = (strides(voxels, size), (S::to_int(x), S::to_int(y), S::to_int(z)));
+        S::add_int(
+            S::mul_int(x, S::splat_int(size)),
+            S::add_int(S::mul_int(y, S::splat_int(row)), S::mul_int(z, S::splat_int(slab))),
+        )
+    }
 }
 
 /// Byte offsets of the four rows of a cell, relative to the base's voxel, and fractions.
@@ -180,25 +220,7 @@ unsafe fn rows<S: Simd>(voxels: &Voxels<'_>, base: &Base, p: [S::F; 3], size: i3
         let (x, fx) = cell::<S>(p[0], base.lo[0], base.hi[0]);
         let (y, fy) = cell::<S>(p[1], base.lo[1], base.hi[1]);
         let (z, fz) = cell::<S>(p[2], base.lo[2], base.hi[2]);
-        let row = (voxels.dims[0] as i32).wrapping_mul(size);
-        let slab = row.wrapping_mul(voxels.dims[1] as i32);
-        let start = if voxels.small {
-            // Offsets in voxels stay below 2²⁴: exact in f32, and cheaper than integer products.
-            let row = S::splat(voxels.dims[0] as f32);
-            let slab = S::splat((voxels.dims[0] * voxels.dims[1]) as f32);
-            let start = S::to_int(S::fma(z, slab, S::fma(y, row, x)));
-            match size {
-                1 => start,
-                2 => S::shl::<1>(start),
-                _ => S::shl::<2>(start),
-            }
-        } else {
-            let (x, y, z) = (S::to_int(x), S::to_int(y), S::to_int(z));
-            S::add_int(
-                S::mul_int(x, S::splat_int(size)),
-                S::add_int(S::mul_int(y, S::splat_int(row)), S::mul_int(z, S::splat_int(slab))),
-            )
-        };
+        let (start, [row, slab]) = (offset::<S>(voxels, [x, y, z], size), strides(voxels, size));
         let dy = S::splat_int(if voxels.max[1] > voxels.min[1] { row } else { 0 });
         let dz = S::splat_int(if voxels.max[2] > voxels.min[2] { slab } else { 0 });
         let next = S::add_int(start, dz);
@@ -208,7 +230,7 @@ unsafe fn rows<S: Simd>(voxels: &Voxels<'_>, base: &Base, p: [S::F; 3], size: i3
 
 /// The base voxel's byte offset.
 #[inline(always)]
-fn origin(voxels: &Voxels<'_>, base: &Base, size: usize) -> usize {
+pub fn origin(voxels: &Voxels<'_>, base: &Base, size: usize) -> usize {
     let [x, y, z] = base.at.map(|v| v as usize);
     ((z * voxels.dims[1] + y) * voxels.dims[0] + x) * size
 }

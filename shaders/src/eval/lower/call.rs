@@ -6,8 +6,8 @@ use super::{Frame, LowerError, Lowered, Lowerer, Mask, Scalar, Value, expression
 use crate::{
     eval::{
         Real,
-        code::{Class, Inst},
-        kernel::Function,
+        code::{Class, Inst, Reg},
+        kernel::{Field, Function, Input},
         ops::{Float1, Float2, ToBits, truth},
         uniforms::Uniform,
     },
@@ -56,9 +56,25 @@ impl<'p, F: Real> Lowerer<'p, F> {
                 if let Some(known) = self.uniforms.and_then(|u| u.value(self.program, function)) {
                     return self.known(handle, &known);
                 }
-                self.ask(handle, function, &numbers(&arguments)?, mask)
+                let arguments = numbers(&arguments)?;
+                if let Some(sample) = self.own_place(function, &arguments).filter(|_| mask == Mask::All) {
+                    return Ok(vec![Scalar::Row(self.input(Input { sample, field: Field::Volume(parameter) }))]);
+                }
+                self.ask(handle, function, &arguments, mask)
             }
         }
+    }
+
+    /// The sample of which a volume's value is asked for at its own position, where that is an input.
+    fn own_place(&self, function: Function, arguments: &[Scalar<F>]) -> Option<usize> {
+        let wanted = self.values && function.derived == Derived::Value && arguments.len() == 3;
+        let input = |reg: Reg| self.inputs.iter().find(|(_, known)| *known == reg).map(|(input, _)| *input);
+        let sample = |axis: u8| match *arguments.get(usize::from(axis))? {
+            Scalar::Row(reg) => input(reg).filter(|i| i.field == Field::Position(axis)).map(|i| i.sample),
+            _ => None,
+        };
+        let first = sample(0).filter(|_| wanted)?;
+        (1..3).all(|axis| sample(axis) == Some(first)).then_some(first)
     }
 
     /// `medium(color, opacity)`: σ = −ln(1 − a)/unit; where no length counts, the opacity itself.

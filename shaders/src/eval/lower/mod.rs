@@ -109,14 +109,19 @@ struct Lowerer<'p, F> {
     float_constants: Vec<(Reg, F)>,
     bits_constants: Vec<(Reg, u32)>,
     functions: Vec<Function>,
+    inputs: Vec<(Input, Reg)>,
+    /// Whether values at samples' own positions are inputs.
+    values: bool,
 }
 
 /// Lowers a function of a program; without uniforms, functions that depend on no sample are asked
-/// of the environment like all others.
+/// of the environment like all others. With `values`, those of volumes at samples' own positions are
+/// inputs.
 pub(crate) fn lower<'p, F: Real>(
     program: &'p Program,
     entry: Entry,
     uniforms: Option<&'p Uniforms<'p>>,
+    values: bool,
 ) -> Lowered<Kernel<F>> {
     let handle = program.entry(entry).ok_or_else(|| LowerError::new(format!("no function `{}`", entry.name())))?;
     let lowerer = Lowerer {
@@ -129,6 +134,8 @@ pub(crate) fn lower<'p, F: Real>(
         float_constants: Vec::new(),
         bits_constants: Vec::new(),
         functions: Vec::new(),
+        inputs: Vec::new(),
+        values,
     };
     lowerer.kernel(handle)
 }
@@ -137,14 +144,8 @@ impl<'p, F: Real> Lowerer<'p, F> {
     fn kernel(mut self, handle: Handle<naga::Function>) -> Lowered<Kernel<F>> {
         let function = &self.program.module().functions[handle];
         let fields = fields(self.program);
-        let mut inputs = Vec::new();
         let mut sample = |(sample, _): (usize, &FunctionArgument)| -> Value<F> {
-            let row = |field| {
-                let reg = self.new_reg(Class::Float);
-                inputs.push((Input { sample, field }, reg));
-                Scalar::Row(reg)
-            };
-            Value::Data(fields.iter().copied().map(row).collect())
+            Value::Data(fields.iter().map(|field| Scalar::Row(self.input(Input { sample, field: *field }))).collect())
         };
         let arguments: Vec<_> = function.arguments.iter().enumerate().map(&mut sample).collect();
         let result = self.inline(handle, arguments, Mask::All)?;
@@ -155,11 +156,21 @@ impl<'p, F: Real> Lowerer<'p, F> {
             code,
             float_constants: self.float_constants,
             bits_constants: self.bits_constants,
-            inputs,
+            inputs: self.inputs,
             outputs,
             functions: self.functions,
         })
         .map_err(LowerError::new)
+    }
+
+    /// The row of an input.
+    fn input(&mut self, input: Input) -> Reg {
+        if let Some((_, reg)) = self.inputs.iter().find(|(known, _)| *known == input) {
+            return *reg;
+        }
+        let reg = self.new_reg(Class::Float);
+        self.inputs.push((input, reg));
+        reg
     }
 
     fn type_of(&self, frame: &Frame<'p, F>, expression: Handle<Expression>) -> &'p TypeInner {

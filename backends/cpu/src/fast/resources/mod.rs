@@ -268,11 +268,18 @@ impl Resources {
         self.shaders.get(&id)
     }
 
-    /// What of a shape's program can be skipped.
+    /// What the first volume says along rays, where a shape's program depends on it, and what of it
+    /// can be skipped.
     pub fn skip<'a>(&'a self, shape: &'a ResolvedShape, unit: Unit) -> Option<Skip<'a>> {
-        let empty = self.vacant.get(&shape.id)?.empty.as_ref()?;
-        let (voxels, _) = plain_voxels(shape.first_volume()?, shaded::component(shape));
-        Some(Skip { voxels, empty, unit })
+        let (shader, texture) = (self.shader(shape.id)?, shape.first_volume()?);
+        let mut volumes = shape.shader.declaration.parameters.iter().map(|p| p.name.as_str());
+        let name = volumes.find(|name| shape.volume(name).is_some_and(|t| std::ptr::eq(t, texture)))?;
+        if !shader.wants_values_of(name) {
+            return None;
+        }
+        let (voxels, units) = plain_voxels(texture, shaded::component(shape));
+        let empty = self.vacant.get(&shape.id).and_then(|vacant| vacant.empty.as_ref());
+        Some(Skip { name, voxels, units, empty, seen: shader.seen_of(name), unit })
     }
 
     /// The geometry of a shape as it was made ready; `None` where it is a box.
@@ -342,9 +349,9 @@ impl Resources {
         say: &mut impl FnMut(&str, usize),
     ) -> Result<(), ActionError> {
         let mut shader = match self.shaders.remove(&shape.id) {
-            Some(kept) if kept.serves(shape, settings.classification) => kept,
+            Some(kept) if kept.serves(shape, settings) => kept,
             last => {
-                let made = Shader::new(shape, settings.classification, last)?;
+                let made = Shader::new(shape, settings, last)?;
                 say("shader", made.bytes());
                 made
             }

@@ -3,6 +3,7 @@
 
 use super::{batch, field::sixteen};
 use crate::fast::{
+    power::exp_parts,
     simd::{LANES, Simd},
     sweep::gather::Row,
 };
@@ -11,7 +12,7 @@ use crate::fast::{
 /// number is NaN, or the extinction not positive.
 ///
 /// α = 1 − e^(−σ·length), as −2ⁿ·(e^r − 1) − (2ⁿ − 1) with −σ·length = n·ln 2 + r, so that small
-/// opacities keep their digits; e^r − 1 by Taylor's series to r⁷, to 1e-8 for |r| ≤ ln 2 / 2.
+/// opacities keep their digits.
 ///
 /// # Safety
 /// Called from a function compiled for `S` on a machine that has it.
@@ -26,15 +27,7 @@ unsafe fn opacity<S: Simd>([r, g, b, sigma]: [S::F; 4], length: S::F) -> (S::F, 
         let seen = S::lt_bits(zero, depth) & !unknown;
         // Beyond, nothing is left in f32.
         let y = S::sub(zero, S::min(depth, S::splat(80.0)));
-        let n = S::floor(S::fma(y, S::splat(std::f32::consts::LOG2_E), S::splat(0.5)));
-        let rest = S::fma(n, S::splat(-0.693_359_4), y);
-        let rest = S::fma(n, S::splat(2.121_944_4e-4), rest);
-        let mut series = S::splat(1.0 / 5040.0);
-        for factorial in [720.0, 120.0, 24.0, 6.0, 2.0] {
-            series = S::fma(series, rest, S::splat(1.0 / factorial));
-        }
-        let less = S::fma(S::mul(rest, rest), series, rest);
-        let power = S::as_float(S::shl::<23>(S::add_int(S::to_int(n), S::splat_int(127))));
+        let (power, less) = exp_parts::<S>(y);
         let alpha = S::sub(S::sub(S::splat(1.0), power), S::mul(power, less));
         (S::select(seen, alpha, zero), seen)
     }
@@ -87,7 +80,7 @@ pub unsafe fn composite<S: Simd>(
             for c in 0..4 {
                 numbers[c] = S::load(sixteen(medium[c], i * LANES));
             }
-            let (alpha, some) = opacity::<S>(numbers, S::load(&row.length));
+            let (alpha, some) = opacity::<S>(numbers, S::load(&row.lengths()));
             let some = some & row.live;
             let alpha = S::select(some, alpha, zero);
             S::store(alpha, kept);

@@ -1,6 +1,9 @@
 //! A function of a shader over batches of samples of sixteen rays.
 
-use std::sync::{Mutex, OnceLock, PoisonError};
+use std::{
+    ops::Deref,
+    sync::{Mutex, OnceLock, PoisonError},
+};
 
 use volact_core::{
     ActionError, Attribute, ParameterValue,
@@ -12,7 +15,13 @@ use volact_shaders::{
     eval::{BATCH, Field, Input, Overrun},
 };
 
-use super::{Shader, surroundings::Surroundings, trail::Trail};
+use super::{
+    Lit, Shader,
+    field::{self, Places},
+    skip,
+    surroundings::{self, Surroundings},
+    trail::Trail,
+};
 use crate::fast::{
     dispatch,
     packet::{Bundle, Lanes},
@@ -30,21 +39,44 @@ pub struct Row {
     pub number: usize,
     /// Lanes that count. The others are evaluated at the place of one of these.
     pub live: u32,
-    /// Where they are on their rays.
-    pub t: Lanes,
-    /// World lengths that they stand for.
-    pub length: [f32; LANES],
-    /// What the compositing made of values.
-    pub value: [f32; LANES],
+    /// Where they are on their rays; the first one's for all where there is a `base`.
+    t: Lanes,
+    /// World lengths that they stand for; the same.
+    length: [f32; LANES],
+    /// What the compositing made of values; or what a volume says at the samples, in data units.
+    value: [f32; LANES],
+    /// Whether the value is that of the volume that the evaluator was told of.
+    fetched: bool,
     /// Where all lanes have one `t` and length: a `t` a little before, from which on positions are
     /// made in single precision. It must not depend on what is skipped. Else NaN.
-    pub base: f64,
+    base: f64,
 }
 
 impl Row {
     /// Samples at `t` for lengths, in some lanes.
     pub fn new(number: usize, live: u32, t: Lanes, length: [f32; LANES]) -> Self {
-        Self { number, live, t, length, value: [0.0; LANES], base: f64::NAN }
+        Self { number, live, t, length, value: [0.0; LANES], fetched: false, base: f64::NAN }
+    }
+
+    /// The same with what the compositing made of values.
+    pub fn with_value(self, value: [f32; LANES]) -> Self {
+        Self { value, ..self }
+    }
+
+    /// Where a lane's sample is on its ray.
+    pub fn t(&self, lane: usize) -> f64 {
+        if self.base.is_nan() { self.t[lane] } else { self.t[0] }
+    }
+
+    /// The world length that a lane's sample stands for.
+    pub fn length(&self, lane: usize) -> f32 {
+        if self.base.is_nan() { self.length[lane] } else { self.length[0] }
+    }
+
+    /// The world lengths of all lanes.
+    #[inline(always)]
+    pub fn lengths(&self) -> [f32; LANES] {
+        if self.base.is_nan() { self.length } else { [self.length[0]; LANES] }
     }
 
     /// A function of the lanes, the idle ones like the first live one: nothing may come of where
@@ -52,6 +84,61 @@ impl Row {
     fn lanes(&self) -> [usize; LANES] {
         let lead = (self.live.trailing_zeros() as usize).min(LANES - 1);
         std::array::from_fn(|l| if self.live >> l & 1 == 1 { l } else { lead })
+    }
+}
+
+/// Rows of a batch. What rows do not need of their slots is left as it was.
+#[derive(Debug, Default)]
+pub struct Rows {
+    slots: Vec<Row>,
+    count: usize,
+}
+
+impl Rows {
+    /// Adds a row.
+    pub fn push(&mut self, row: Row) {
+        match self.slots.get_mut(self.count) {
+            Some(slot) => *slot = row,
+            None => self.slots.push(row),
+        }
+        self.count += 1;
+    }
+
+    /// Adds a row of samples that all are at one `t` for one length, with the values of the volume
+    /// that the evaluator was told of, where they are known. See [`Row`] for `base`.
+    pub fn push_even(
+        &mut self,
+        (number, live): (usize, u32),
+        (t, base): (f64, f64),
+        length: f32,
+        value: Option<&[f32; LANES]>,
+    ) {
+        if self.slots.len() == self.count {
+            self.slots.push(Row::new(0, 0, [0.0; LANES], [0.0; LANES]));
+        }
+        let row = &mut self.slots[self.count];
+        (row.number, row.live, row.base, row.fetched) = (number, live, base, value.is_some());
+        (row.t[0], row.length[0]) = (t, length);
+        row.value = value.map_or([0.0; LANES], |value| *value);
+        self.count += 1;
+    }
+
+    /// Adds rows.
+    pub fn extend(&mut self, rows: impl IntoIterator<Item = Row>) {
+        rows.into_iter().for_each(|row| self.push(row));
+    }
+
+    /// Forgets all rows.
+    pub fn clear(&mut self) {
+        self.count = 0;
+    }
+}
+
+impl Deref for Rows {
+    type Target = [Row];
+
+    fn deref(&self) -> &[Row] {
+        &self.slots[..self.count]
     }
 }
 
@@ -75,6 +162,12 @@ pub struct Evaluator<'a> {
     /// Vertex numbers by parameter.
     attributes: Vec<Option<&'a Attribute>>,
     component: usize,
+    /// The volumes of which values at samples' own positions are wanted, by input.
+    values: Vec<Option<field::Field<'a>>>,
+    /// The input that rows bring with them.
+    brought: Option<usize>,
+    /// What computes the same without the program, where a mesh carries nothing along.
+    lit: Option<Native<'a>>,
     /// Whether it is a function of both ends of a segment.
     of_segments: bool,
     unit: Unit,
@@ -83,20 +176,36 @@ pub struct Evaluator<'a> {
     failed: OnceLock<Overrun>,
 }
 
+/// What needs only positions and one volume's values: by input.
+#[derive(Debug)]
+struct Native<'a> {
+    lit: Lit<'a>,
+    places: [usize; 3],
+    value: usize,
+}
+
 /// What a thread needs to evaluate batches.
 #[derive(Debug)]
 pub struct Worker<'a> {
     machine: Machine<'a, f32>,
+    /// What was computed without the machine, where that was done last.
+    media: [Vec<f32>; 4],
+    natively: bool,
     /// The batch.
-    pub rows: Vec<Row>,
-    inputs: Vec<Vec<f32>>,
+    pub rows: Rows,
+    /// Positions, of those that values of volumes are wanted at.
+    places: [Vec<f32>; 3],
     maps: Vec<DAffine3>,
+    /// Opacities of the rows that were composited last.
+    pub alphas: Vec<[f32; LANES]>,
+    /// Room for what a walk finds.
+    pub found: Option<Box<skip::Rows>>,
 }
 
 impl Worker<'_> {
     /// The numbers that the last batch gave, sixteen a row.
     pub fn output(&self, index: usize) -> &[f32] {
-        self.machine.output(index)
+        if self.natively { &self.media[index] } else { self.machine.output(index) }
     }
 }
 
@@ -113,12 +222,21 @@ impl<'a> Evaluator<'a> {
             _ => None,
         };
         let parameters = &shape.shader.declaration.parameters;
+        let surroundings = Surroundings::new(shape, shader, kernel.functions(), unit);
+        let inputs: Vec<Input> = kernel.inputs().collect();
+        let value = |input: &Input| match input.field {
+            Field::Volume(p) => surroundings::value(shape, shader, p, unit),
+            _ => None,
+        };
         Self {
             shape,
             kernel,
-            inputs: kernel.inputs().collect(),
+            values: inputs.iter().map(value).collect(),
+            brought: None,
+            lit: None,
+            inputs,
             origin: shader.origin,
-            surroundings: Surroundings::new(shape, shader, kernel.functions(), unit),
+            surroundings,
             attributes: parameters.iter().map(|p| attribute(&p.name)).collect(),
             component: super::component(shape),
             of_segments: entry == Entry::Segment,
@@ -126,6 +244,31 @@ impl<'a> Evaluator<'a> {
             workers: Mutex::default(),
             failed: OnceLock::new(),
         }
+    }
+
+    /// Told that rows may bring the value of the shape's first volume with them.
+    pub fn with_values_of(mut self, name: &str) -> Self {
+        let parameters = &self.shape.shader.declaration.parameters;
+        let named = |p: usize| parameters.get(p).is_some_and(|p| p.name == name);
+        self.brought = self.inputs.iter().position(|i| matches!(i.field, Field::Volume(p) if named(p)));
+        self
+    }
+
+    /// Told that the program is that of `gradient`.
+    pub fn lit(mut self, shader: &'a Shader) -> Self {
+        let at = |field: Field| self.inputs.iter().position(|input| *input == Input { sample: 0, field });
+        let place = |axis| at(Field::Position(axis));
+        self.lit = self.native(shader, [place(0), place(1), place(2)]);
+        self
+    }
+
+    fn native(&self, shader: &'a Shader, places: [Option<usize>; 3]) -> Option<Native<'a>> {
+        let value = self.inputs.iter().position(|input| matches!(input.field, Field::Volume(_)))?;
+        let Field::Volume(parameter) = self.inputs[value].field else { return None };
+        let field = surroundings::value(self.shape, shader, parameter, self.unit)?;
+        let lit = Lit::new(self.shape, field, shader.lookup("lookup_table")?, self.origin)?;
+        let [x, y, z] = places;
+        Some(Native { lit, places: [x?, y?, z?], value })
     }
 
     /// The first failure of the program.
@@ -144,9 +287,13 @@ impl<'a> Evaluator<'a> {
         let lent = free().pop();
         let mut worker = lent.unwrap_or_else(|| Worker {
             machine: Machine::new(self.kernel),
-            rows: Vec::with_capacity(ROWS),
-            inputs: vec![Vec::with_capacity(BATCH); self.inputs.len()],
+            media: [const { Vec::new() }; 4],
+            natively: false,
+            rows: Rows::default(),
+            places: [const { Vec::new() }; 3],
             maps: Vec::new(),
+            alphas: vec![[0.0; LANES]; ROWS],
+            found: None,
         });
         worker.rows.clear();
         let result = work(&mut worker);
@@ -157,15 +304,20 @@ impl<'a> Evaluator<'a> {
     /// Evaluates a worker's rows; `false` where nothing came of it, since the program failed or
     /// there are none.
     pub fn run(&self, rays: Rays<'_>, worker: &mut Worker<'a>) -> bool {
-        let Worker { machine, rows, inputs, maps } = worker;
+        let Worker { machine, media, natively, rows, places, maps, .. } = worker;
         if rows.is_empty() || self.failed.get().is_some() {
             return false;
         }
-        let local = rays.bundle.local(self.origin);
-        for numbers in inputs.iter_mut() {
-            numbers.resize(rows.len() * LANES, 0.0);
+        maps.clear();
+        if let Some(trail) = rays.trail.filter(|trail| trail.is_bent()) {
+            for row in rows.iter() {
+                maps.extend(row.lanes().map(|l| trail.map(l, row.t(l), self.origin)));
+            }
         }
+        let local = rays.bundle.local(self.origin);
         let lines = std::array::from_fn(|a| [&local[a], &rays.bundle.direction[a]]);
+        let native = self.lit.as_ref().filter(|_| maps.is_empty());
+        *natively = native.is_some();
         // Positions come as three inputs in a row, or fewer where some are not wanted.
         let mut at = 0;
         while let Some(input) = self.inputs.get(at) {
@@ -175,37 +327,69 @@ impl<'a> Evaluator<'a> {
                 if *sample == input.sample && usize::from(*a) == n)
             };
             if position(0) && position(1) && position(2) {
-                if let [x, y, z, ..] = &mut inputs[at..] {
-                    dispatch::places(self.unit, &lines, rows, shift, [x, y, z]);
+                if let Some(to) = machine.inputs([at, at + 1, at + 2]) {
+                    dispatch::places(self.unit, &lines, rows, shift, to);
                 }
                 at += 3;
                 continue;
             }
-            for (row, to) in rows.iter().zip(inputs[at].as_chunks_mut().0) {
-                self.numbers(*input, rays, shift, row, to);
+            if let Some([to]) = machine.inputs([at]) {
+                match &self.values[at] {
+                    Some(field) => {
+                        let brought = self.brought == Some(at);
+                        self.values(field, (&lines, shift), (rows, maps), brought, places, to);
+                    }
+                    None => {
+                        let wanted = rows.iter().filter(|_| native.is_none());
+                        for (row, to) in wanted.zip(to.as_chunks_mut().0) {
+                            self.numbers(*input, rays, shift, row, to);
+                        }
+                    }
+                }
             }
             at += 1;
         }
-        self.idle(rows, inputs);
-        maps.clear();
-        if let Some(trail) = rays.trail.filter(|trail| trail.is_bent()) {
-            for row in rows.iter() {
-                maps.extend(row.lanes().map(|l| trail.map(l, row.t[l], self.origin)));
+        self.idle(rows, machine);
+        if let Some(Native { lit, places: [x, y, z], value }) = native {
+            let samples = rows.len() * LANES;
+            media.iter_mut().for_each(|row| row.resize(samples, 0.0));
+            if let Some([x, y, z, values]) = machine.inputs([*x, *y, *z, *value]) {
+                let places = [&x[..samples], &y[..samples], &z[..samples]];
+                dispatch::lit(self.unit, lit, &values[..samples], places, &rays.bundle.direction, media);
             }
+            return true;
         }
-        let mut lent: [&[f32]; 64] = [&[]; 64];
-        let many: Vec<&[f32]>;
-        let given = if inputs.len() <= lent.len() {
-            lent.iter_mut().zip(inputs.iter()).for_each(|(to, from)| *to = from);
-            &lent[..inputs.len()]
-        } else {
-            many = inputs.iter().map(Vec::as_slice).collect();
-            &many
-        };
         let mut asked = self.surroundings.asked(maps);
-        let result = machine.run(rows.len() * LANES, given, &mut asked);
+        let result = machine.run_in_place(rows.len() * LANES, &mut asked);
         // The first one is told; which one that is does not matter.
         result.map_err(|overrun| self.failed.set(overrun)).is_ok()
+    }
+
+    /// Values of a volume at rows of samples, as far as they do not bring them.
+    fn values(
+        &self,
+        field: &field::Field<'_>,
+        (lines, shift): (&[[&Lanes; 2]; 3], f64),
+        (rows, maps): (&[Row], &[DAffine3]),
+        brought: bool,
+        places: &mut [Vec<f32>; 3],
+        to: &mut [f32],
+    ) {
+        let mut first = 0;
+        for some in rows.chunk_by(|a, b| (brought && a.fetched) == (brought && b.fetched)) {
+            let (numbers, begin) = (some.len() * LANES, first * LANES);
+            let to = &mut to[begin..begin + numbers];
+            if brought && some[0].fetched {
+                some.iter().zip(to.as_chunks_mut::<LANES>().0).for_each(|(row, to)| *to = row.value);
+            } else {
+                places.iter_mut().for_each(|row| row.resize(numbers.max(row.len()), 0.0));
+                dispatch::places(self.unit, lines, some, shift, places.each_mut().map(|row| &mut row[..numbers]));
+                let p = places.each_ref().map(|row| &row[..numbers]);
+                let maps = maps.get(begin..begin + numbers).unwrap_or_default();
+                field.values(Places { p: &p, maps }, to);
+            }
+            first += some.len();
+        }
     }
 
     /// Where an input is taken, from the middle of a segment on, in its lengths: functions of
@@ -219,19 +403,22 @@ impl<'a> Evaluator<'a> {
     }
 
     /// Puts idle lanes where a live one is.
-    fn idle(&self, rows: &[Row], inputs: &mut [Vec<f32>]) {
+    fn idle(&self, rows: &[Row], machine: &mut Machine<'a, f32>) {
         for (i, row) in rows.iter().enumerate().filter(|(_, row)| row.live != ALL) {
             let lanes = row.lanes();
-            for to in inputs.iter_mut().filter_map(|numbers| numbers.as_chunks_mut::<LANES>().0.get_mut(i)) {
-                let numbers = *to;
-                *to = lanes.map(|l| numbers[l]);
+            for input in 0..self.inputs.len() {
+                let Some([numbers]) = machine.inputs([input]) else { continue };
+                if let Some(to) = numbers.as_chunks_mut::<LANES>().0.get_mut(i) {
+                    let numbers = *to;
+                    *to = lanes.map(|l| numbers[l]);
+                }
             }
         }
     }
 
     /// A number of a row of samples.
     fn numbers(&self, input: Input, rays: Rays<'_>, shift: f64, row: &Row, to: &mut [f32; LANES]) {
-        let at = |l: usize| row.t[l] + shift * f64::from(row.length[l]);
+        let at = |l: usize| row.t(l) + shift * f64::from(row.length(l));
         match input.field {
             Field::Position(a) => {
                 let (a, eye) = (usize::from(a), self.origin[usize::from(a)]);
@@ -240,9 +427,12 @@ impl<'a> Evaluator<'a> {
             }
             Field::Direction(a) => *to = rays.bundle.direction[usize::from(a)].map(|d| d as f32),
             Field::View(a) => *to = rays.bundle.direction[usize::from(a)].map(|d| -d as f32),
-            Field::Step => *to = row.length,
+            Field::Step => *to = row.lengths(),
             Field::Depth => (0..LANES).for_each(|l| to[l] = (at(l) - rays.bundle.depth_zero) as f32),
+            Field::Value if row.fetched => to.fill(0.0),
             Field::Value => *to = row.value,
+            // One that was left out.
+            Field::Volume(_) => to.fill(0.0),
             Field::Attribute(p) => self.attribute(rays, (p, self.component), &at, row, to),
             Field::AttributeComponent(p, c) => self.attribute(rays, (p, usize::from(c)), &at, row, to),
         }

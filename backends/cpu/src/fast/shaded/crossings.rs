@@ -187,14 +187,14 @@ impl<'a> Crossings<'a> {
                     let bracket = |level: &f64| Bracket {
                         lane: l,
                         level: *level,
-                        t: [last.t[l], row.t[l]],
+                        t: [last.t[l], row.t(l)],
                         off: [from - level, to - level],
                         moved: None,
                         near: NEAR * (to - from).abs(),
                         found: None,
                     };
                     brackets.extend(self.levels.iter().filter(crossed).map(bracket));
-                    (last.t[l], last.value[l]) = (row.t[l], to);
+                    (last.t[l], last.value[l]) = (row.t(l), to);
                 }
             }
         }
@@ -219,12 +219,11 @@ impl<'a> Crossings<'a> {
             |some| {
                 self.shade.with(|worker| {
                     worker.rows.extend(some.iter().map(|lanes| {
-                        let (mut row, mut at) = (Row::new(0, 0, [0.0; LANES], [self.step as f32; LANES]), [0.0; LANES]);
+                        let (mut live, mut at, mut value) = (0, [0.0; LANES], [0.0; LANES]);
                         for &&(l, t, level) in lanes {
-                            (row.live, at[l], row.value[l]) = (row.live | 1 << l, t, level as f32);
+                            (live, at[l], value[l]) = (live | 1 << l, t, level as f32);
                         }
-                        row.t = at;
-                        row
+                        Row::new(0, live, at, [self.step as f32; LANES]).with_value(value)
                     }));
                     if !self.shade.run(rays, worker) {
                         return;
@@ -253,10 +252,9 @@ impl<'a> Crossings<'a> {
             |some| {
                 self.value.with(|worker| {
                     worker.rows.extend(some.iter().map(|lanes| {
-                        let (mut row, mut at) = (Row::new(0, 0, [0.0; LANES], [self.step as f32; LANES]), [0.0; LANES]);
-                        lanes.iter().for_each(|&&(_, l, t)| (row.live, at[l]) = (row.live | 1 << l, t));
-                        row.t = at;
-                        row
+                        let (mut live, mut at) = (0, [0.0; LANES]);
+                        lanes.iter().for_each(|&&(_, l, t)| (live, at[l]) = (live | 1 << l, t));
+                        Row::new(0, live, at, [self.step as f32; LANES])
                     }));
                     if self.value.run(rays, worker) {
                         for (i, lanes) in some.iter().enumerate() {

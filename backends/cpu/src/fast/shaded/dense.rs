@@ -5,9 +5,9 @@ use volact_shaders::Entry;
 
 use super::{
     Shader,
-    batch::{Evaluator, ROWS, Rays, Row, Worker},
+    batch::{Evaluator, ROWS, Rays, Row, Rows, Worker},
     field::sixteen,
-    skip::Skip,
+    skip::{self, Skip},
 };
 use crate::fast::{
     dispatch,
@@ -41,9 +41,16 @@ impl<'a> Dense<'a> {
     pub fn new(shape: &'a ResolvedShape, shader: &'a Shader, skip: Option<Skip<'a>>, step: f64, unit: Unit) -> Self {
         let of = |entry, kernel| Evaluator::new(shape, shader, (entry, kernel), unit);
         let place = || of(Entry::Shade, &shader.shade);
+        let brought = |evaluator: Evaluator<'a>| {
+            let evaluator = if shader.is_lit() { evaluator.lit(shader) } else { evaluator };
+            match &skip {
+                Some(skip) => evaluator.with_values_of(skip.name),
+                None => evaluator,
+            }
+        };
         let (medium, other) = match &shader.segment {
             Some(segment) => (of(Entry::Segment, segment), Some(place())),
-            None => (place(), None),
+            None => (brought(place()), None),
         };
         let sliced = shape.state.geometry.slices().is_some();
         let thickness = shape.float("unit_distance").unwrap_or(1.0);
@@ -96,17 +103,22 @@ impl<'a> Dense<'a> {
         }
     }
 
-    /// The rows of the chunk that begins with segment `first` in which there may be something;
-    /// returns the next segment in which there may be.
-    fn rows(&self, at: (&Packet, &Cuts), first: i64, done: u32, mut add: impl FnMut(Row)) -> i64 {
-        let length = [self.step as f32; LANES];
-        let mut add = |row: usize, live: u32| {
-            let t = ((first + row as i64) as f64 + 0.5) * self.step;
-            add(Row { base: first as f64 * self.step, ..Row::new(row, live, [t; LANES], length) });
-        };
-        if let Some(skip) = &self.skip {
-            return skip.rows(at, (self.step, first), done, add);
-        }
+    /// Adds a row of whole segments of the chunk that begins with segment `first`, with values there.
+    fn add(&self, rows: &mut Rows, first: i64, row: (usize, u32), value: Option<&[f32; LANES]>) {
+        let t = ((first + row.0 as i64) as f64 + 0.5) * self.step;
+        rows.push_even(row, (t, first as f64 * self.step), self.step as f32, value);
+    }
+
+    /// Calls `add` with the rows of the chunk that begins with segment `first`, and their lanes;
+    /// returns the next segment.
+    fn all(
+        &self,
+        at: (&Packet, &Cuts),
+        first: i64,
+        done: u32,
+        counts: &mut Counts,
+        mut add: impl FnMut(usize, u32),
+    ) -> i64 {
         let (cuts, end) = (at.1, first + CHUNK as i64);
         let place = |k: f64| (k as i64 - first).clamp(0, CHUNK as i64) as usize;
         // Lanes that begin and end at rows.
@@ -119,6 +131,7 @@ impl<'a> Dense<'a> {
         for row in 0..CHUNK {
             live = (live | begins[row]) & !ends[row];
             if live != 0 {
+                counts.samples += u64::from(live.count_ones());
                 add(row, live);
             }
         }
@@ -139,36 +152,74 @@ impl<'a> Dense<'a> {
         let mut sight = Sight { seen, depth: pixels.depth, threshold };
         let done = |sight: &Sight| (0..LANES).fold(0, |d, l| d | u32::from(1.0 - sight.seen[3][l] < termination) << l);
         self.medium.with(|worker| {
+            let mut found = worker.found.take().unwrap_or_default();
             for packet in stretches {
                 let cuts = packet.split(self.step);
                 counts.lattice += cuts.count();
                 self.cut(&cuts.front, done(&sight), worker, counts);
-                let [first, last] = cuts.whole().unwrap_or([0, 0]);
-                let mut next = first;
-                while next < last {
-                    let chunk = next.div_euclid(CHUNK as i64) * CHUNK as i64;
-                    let mut more = 0;
-                    next = self.rows((packet, &cuts), chunk, done(&sight), |row| {
-                        more += u64::from(row.live.count_ones());
-                        if worker.rows.len() == ROWS {
+                match &self.skip {
+                    Some(skip) => {
+                        let before = done(&sight);
+                        let mut take = |first: i64, found: &skip::Rows| {
+                            for (number, live, values) in found.iter() {
+                                self.push((first, number, live), Some(values), rays, worker, &mut sight);
+                            }
                             self.lay(rays, worker, &mut sight);
-                        }
-                        worker.rows.push(row);
-                    });
-                    counts.samples += more;
-                    self.lay(rays, worker, &mut sight);
-                    if done(&sight) & ALL == ALL {
-                        break;
+                            done(&sight)
+                        };
+                        let to = (&mut *found, &mut take as &mut skip::Take<'_>);
+                        dispatch::visit(self.unit, skip, (packet, &cuts), self.step, before, to, counts);
                     }
+                    None => self.chunks((packet, &cuts), rays, worker, &mut sight, counts, done),
                 }
                 self.cut(&cuts.back, done(&sight), worker, counts);
                 self.lay(rays, worker, &mut sight);
             }
+            worker.found = Some(found);
         });
         for (l, color) in pixels.color.iter_mut().enumerate() {
             *color = sight.seen.map(|row| row[l]);
         }
         pixels.depth = sight.depth;
+    }
+
+    /// Draws whole segments, chunk by chunk, all of them.
+    fn chunks(
+        &self,
+        at: (&Packet, &Cuts),
+        rays: Rays<'_>,
+        worker: &mut Worker<'a>,
+        sight: &mut Sight,
+        counts: &mut Counts,
+        done: impl Fn(&Sight) -> u32,
+    ) {
+        let [first, last] = at.1.whole().unwrap_or([0, 0]);
+        let mut next = first;
+        while next < last {
+            let chunk = next.div_euclid(CHUNK as i64) * CHUNK as i64;
+            next = self.all(at, chunk, done(sight), counts, |row, live| {
+                self.push((chunk, row, live), None, rays, worker, sight);
+            });
+            self.lay(rays, worker, sight);
+            if done(sight) & ALL == ALL {
+                break;
+            }
+        }
+    }
+
+    /// Adds a row to a worker's, which are laid first where it has no more room.
+    fn push(
+        &self,
+        (first, number, live): (i64, usize, u32),
+        values: Option<&[f32; LANES]>,
+        rays: Rays<'_>,
+        worker: &mut Worker<'a>,
+        sight: &mut Sight,
+    ) {
+        if worker.rows.len() == ROWS {
+            self.lay(rays, worker, sight);
+        }
+        self.add(&mut worker.rows, first, (number, live), values);
     }
 
     /// Takes a cut segment of each ray that is not done.
@@ -184,15 +235,18 @@ impl<'a> Dense<'a> {
 
     /// Lays a worker's rows behind what was seen.
     fn lay(&self, rays: Rays<'_>, worker: &mut Worker<'a>, sight: &mut Sight) {
+        let mut alphas = std::mem::take(&mut worker.alphas);
         if self.medium.run(rays, worker) {
             let medium = [0, 1, 2, 3].map(|c| worker.output(c));
-            let (mut alphas, before) = ([[0f32; LANES]; ROWS], sight.seen[3]);
-            dispatch::composite(self.unit, &worker.rows, &medium, &mut sight.seen, &mut alphas);
+            let Sight { seen, depth, threshold } = sight;
+            let (before, threshold) = (seen[3], *threshold);
+            dispatch::composite(self.unit, &worker.rows, &medium, seen, &mut alphas);
             let rows = worker.rows.iter().zip(&alphas);
-            for l in (0..LANES).filter(|l| before[*l] < sight.threshold && sight.seen[3][*l] >= sight.threshold) {
-                sight.depth[l] = reached(l, before[l], sight.threshold, rows.clone());
+            for l in (0..LANES).filter(|l| before[*l] < threshold && seen[3][*l] >= threshold) {
+                depth[l] = reached(l, before[l], threshold, rows.clone());
             }
         }
+        worker.alphas = alphas;
         worker.rows.clear();
     }
 }
@@ -214,8 +268,8 @@ fn reached<'r>(
 ) -> f64 {
     let mut end = f64::INFINITY;
     for (row, alpha) in rows.filter(|(row, _)| row.live >> l & 1 == 1) {
-        let (length, after) = (f64::from(row.length[l]), opacity + (1.0 - opacity) * alpha[l]);
-        let start = row.t[l] - 0.5 * length;
+        let (length, after) = (f64::from(row.length(l)), opacity + (1.0 - opacity) * alpha[l]);
+        let start = row.t(l) - 0.5 * length;
         if after >= threshold {
             return start + f64::from(part_of(opacity, alpha[l], threshold)) * length;
         }
@@ -245,10 +299,20 @@ impl Batches for Dense<'_> {
         counts: &mut Counts,
     ) -> i64 {
         self.medium.with(|worker| {
-            let next = self.rows(at, first, done, |row| {
-                counts.samples += u64::from(row.live.count_ones());
-                worker.rows.push(row);
-            });
+            let next = match &self.skip {
+                Some(skip) => {
+                    let mut found = worker.found.take().unwrap_or_default();
+                    let next = dispatch::visible(self.unit, skip, at, (self.step, first), done, &mut found, counts);
+                    for (number, live, values) in found.iter() {
+                        self.add(&mut worker.rows, first, (number, live), Some(values));
+                    }
+                    worker.found = Some(found);
+                    next
+                }
+                None => self.all(at, first, done, counts, |number, live| {
+                    self.add(&mut worker.rows, first, (number, live), None);
+                }),
+            };
             debug_assert!(worker.rows.len() <= ROWS);
             self.entries(rays, worker, |row, entries| chunk.put(row.number, entries));
             next

@@ -171,8 +171,7 @@ impl<'a> Field<'a> {
 /// Called from a function compiled for `S` on a machine that has it; `F` is the voxels' access.
 #[inline(always)]
 pub unsafe fn values<S: Simd, F: Fetch>(field: &Field<'_>, p: Places<'_>, out: &mut [f32]) {
-    let (scale, offset) = (field.units.scale, field.units.offset);
-    let plain = scale == 1.0 && offset == 0.0;
+    let plain = field.units.are_stored();
     for (i, out) in out.as_chunks_mut::<LANES>().0.iter_mut().enumerate() {
         // SAFETY: the caller's promises.
         unsafe {
@@ -180,9 +179,7 @@ pub unsafe fn values<S: Simd, F: Fetch>(field: &Field<'_>, p: Places<'_>, out: &
             S::store(F::fetch::<S>(&field.voxels, &field.base, at), out);
         }
         if !plain {
-            for value in out {
-                *value = (f64::from(*value) * scale + offset) as f32;
-            }
+            field.units.apply(out);
         }
     }
 }
@@ -207,30 +204,24 @@ pub unsafe fn gradients<S: Simd>(field: &Field<'_>, p: Places<'_>, out: &mut [&m
         }
         // Along each axis of the data, over one voxel either way, up to the data's edge.
         let mut along = [[0f32; LANES]; 3];
-        for a in 0..3 {
-            let (mut after, mut before) = ([0f32; LANES], [0f32; LANES]);
-            let here = at[a];
-            at[a] = here.map(|v| v + 1.0);
-            dispatch::numbers(field.unit, &field.whole, &field.data, &at, &mut after);
-            at[a] = here.map(|v| v - 1.0);
-            dispatch::numbers(field.unit, &field.whole, &field.data, &at, &mut before);
-            at[a] = here;
-            for l in 0..LANES {
-                along[a][l] = half * (after[l] - before[l]);
-            }
-        }
+        dispatch::slopes(field.unit, &field.whole, &field.data, &at, &mut along);
         for (c, row) in out.iter_mut().enumerate() {
             let Some(row) = row.get_mut(first..).and_then(<[f32]>::first_chunk_mut::<LANES>) else { continue };
             // The transpose of the map to samples.
-            let mut column = field.linear.col(c).to_array();
-            let mut sum = [0f32; LANES];
-            for l in 0..LANES {
-                if !p.maps.is_empty() {
-                    column = field.slope(p, first + l).col(c).to_array();
+            if p.maps.is_empty() {
+                let column = field.linear.col(c) * half;
+                // SAFETY: the caller's promise.
+                unsafe {
+                    let sum = S::mul(S::splat(column.x), S::load(&along[0]));
+                    let sum = S::fma(S::splat(column.y), S::load(&along[1]), sum);
+                    S::store(S::fma(S::splat(column.z), S::load(&along[2]), sum), row);
                 }
-                sum[l] = column[0] * along[0][l] + column[1] * along[1][l] + column[2] * along[2][l];
+                continue;
             }
-            *row = sum;
+            for (l, to) in row.iter_mut().enumerate() {
+                let column = field.slope(p, first + l).col(c) * half;
+                *to = column.x * along[0][l] + column.y * along[1][l] + column.z * along[2][l];
+            }
         }
     }
 }

@@ -118,7 +118,7 @@ impl<'a> Flattened<'a> {
                 counts.samples += u64::from(row.live.count_ones());
                 counts.lattice += u64::from(row.live.count_ones());
                 for l in (0..LANES).filter(|l| row.live >> l & 1 == 1 && !values[*l].is_nan()) {
-                    self.merge(&mut reduced[l], f64::from(values[l]), f64::from(row.length[l]));
+                    self.merge(&mut reduced[l], f64::from(values[l]), f64::from(row.length(l)));
                 }
             }
         }
@@ -149,13 +149,12 @@ impl<'a> Flattened<'a> {
             return colors;
         }
         self.shade.with(|worker| {
-            let mut row = Row::new(0, live, enters, inside.map(|v| v as f32));
-            row.value = reduced.map(|r| match self.compositing {
+            let value = reduced.map(|r| match self.compositing {
                 Compositing::Average => r.value / r.length,
                 Compositing::Add => r.value / self.unit,
                 _ => r.value,
             } as f32);
-            worker.rows.push(row);
+            worker.rows.push(Row::new(0, live, enters, inside.map(|v| v as f32)).with_value(value));
             if !self.shade.run(rays, worker) {
                 return;
             }

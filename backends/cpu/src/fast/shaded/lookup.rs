@@ -3,10 +3,12 @@
 
 #![expect(unsafe_code, reason = "kernels of a vector unit")]
 
-use volact_core::table::ResolvedTable;
+use volact_core::{ControlPoint, table::ResolvedTable};
 
+use super::batch::ROWS;
 use crate::fast::{
     classify::aligned,
+    power,
     simd::{LANES, Simd},
     sweep::{
         lane::Lane,
@@ -35,6 +37,7 @@ pub struct Lookup {
     low: f32,
     scale: f32,
     unit: f64,
+    seen: [f32; 2],
     baked: Option<Baked>,
 }
 
@@ -91,13 +94,13 @@ impl Baked {
         Some(Self { nodes, scale: scale as f32, offset: offset as f32 })
     }
 
-    /// Colour and extinction of sixteen values; NaN for NaN.
+    /// The node before each of sixteen values, and the part of the way to the next; NaN for NaN.
     ///
     /// # Safety
     /// Called from a function compiled for `S` on a machine that has it.
     #[inline(always)]
-    unsafe fn medium<S: Simd>(&self, value: &[f32; LANES]) -> [S::F; 4] {
-        // SAFETY: the caller's promise; nodes are inside, and the last one has another after it.
+    unsafe fn place<S: Simd>(&self, value: &[f32; LANES]) -> (S::I, S::F) {
+        // SAFETY: the caller's promise.
         unsafe {
             let value = S::load(value);
             let unknown = S::nan_bits(value);
@@ -105,21 +108,67 @@ impl Baked {
             let place = S::fma(value, S::splat(self.scale), S::splat(self.offset));
             let place = S::min(S::max(S::select(unknown, S::splat(0.0), place), S::splat(0.0)), most);
             let whole = S::floor(place);
-            let part = S::sub(place, whole);
-            let (mut low, mut high) = ([0i32; LANES], [0i32; LANES]);
-            let node = S::to_int(whole);
-            S::store_int(node, &mut low);
-            S::store_int(S::add_int(node, S::splat_int(1)), &mut high);
-            let nodes = self.nodes.as_ptr().cast::<u8>();
-            let (from, to) = (S::rows(nodes, &low), S::rows(nodes, &high));
-            let mut medium = [value; 4];
-            for c in 0..4 {
-                let number = S::fma(part, S::sub(to[c], from[c]), from[c]);
-                medium[c] = S::select(unknown, S::splat(f32::NAN), number);
-            }
-            medium
+            (S::to_int(whole), S::select(unknown, S::splat(f32::NAN), S::sub(place, whole)))
         }
     }
+
+    /// Colour and extinction at a place.
+    ///
+    /// # Safety
+    /// As [`place`](Self::place), which gave the place.
+    #[inline(always)]
+    unsafe fn between<S: Simd>(&self, node: &[i32; LANES], part: S::F) -> [S::F; 4] {
+        // SAFETY: the caller's promise; nodes are inside, and the last one has another after it.
+        unsafe { S::between_rows(self.nodes.as_ptr().cast(), node, part) }
+    }
+
+    /// Colour and extinction of rows of values. Places come first, all of them: so the nodes are
+    /// loaded by numbers in memory, and their latencies overlap.
+    ///
+    /// # Safety
+    /// As [`place`](Self::place).
+    #[inline(always)]
+    unsafe fn media<S: Simd>(&self, values: &[f32], out: &mut [&mut [f32]]) {
+        let (mut nodes, mut parts) = ([[0i32; LANES]; ROWS], [[0f32; LANES]; ROWS]);
+        for (i, some) in values.chunks(ROWS * LANES).enumerate() {
+            let rows = some.as_chunks::<LANES>().0;
+            for (value, (node, part)) in rows.iter().zip(nodes.iter_mut().zip(&mut parts)) {
+                // SAFETY: the caller's promise.
+                unsafe {
+                    let place = self.place::<S>(value);
+                    S::store_int(place.0, node);
+                    S::store(place.1, part);
+                }
+            }
+            for (r, (node, part)) in nodes.iter().zip(&parts).take(rows.len()).enumerate() {
+                // SAFETY: the caller's promise.
+                unsafe { put::<S>(self.between::<S>(node, S::load(part)), i * ROWS + r, out) }
+            }
+        }
+    }
+}
+
+/// Stores four numbers in a row of sixteen, as far as they are wanted.
+#[inline(always)]
+unsafe fn put<S: Simd>(numbers: [S::F; 4], row: usize, out: &mut [&mut [f32]]) {
+    for (to, numbers) in out.iter_mut().zip(numbers) {
+        if let Some(to) = to.as_chunks_mut::<LANES>().0.get_mut(row) {
+            // SAFETY: the caller's promise.
+            unsafe { S::store(numbers, to) };
+        }
+    }
+}
+
+/// [`Lookup::seen`].
+fn seen(table: &ResolvedTable) -> [f32; 2] {
+    let points = table.points();
+    let some = |p: &ControlPoint| p.opacity > 0.0;
+    let (Some(first), Some(last)) = (points.iter().position(some), points.iter().rposition(some)) else {
+        return [f32::INFINITY, f32::NEG_INFINITY];
+    };
+    let low = first.checked_sub(1).map_or(f32::NEG_INFINITY, |i| points[i].value as f32);
+    let high = points.get(last + 1).map_or(f32::INFINITY, |p| p.value as f32);
+    [low, high]
 }
 
 impl Lookup {
@@ -153,7 +202,13 @@ impl Lookup {
         };
         let bins = if scale > 0.0 { (0..=BINS).map(first).collect() } else { vec![0] };
         values.push(f32::INFINITY);
-        Self { values, lines, anchors, bins, low, scale, unit, baked: Baked::new(table, unit) }
+        let seen = seen(table);
+        Self { values, lines, anchors, bins, low, scale, unit, seen, baked: Baked::new(table, unit) }
+    }
+
+    /// Everything below the first value and above the second is transparent.
+    pub fn seen(&self) -> [f32; 2] {
+        self.seen
     }
 
     /// Bytes held.
@@ -229,46 +284,40 @@ impl Lookup {
         }
     }
 
+    /// Colour and extinction of sixteen values; NaN for NaN.
+    ///
+    /// # Safety
+    /// Called from a function compiled for `S` on a machine that has it.
+    #[inline(always)]
+    pub unsafe fn medium<S: Simd>(&self, value: &[f32; LANES]) -> [S::F; 4] {
+        // SAFETY: the caller's promise.
+        unsafe {
+            if let Some(baked) = &self.baked {
+                let (node, part) = baked.place::<S>(value);
+                let mut nodes = [0i32; LANES];
+                S::store_int(node, &mut nodes);
+                return baked.between::<S>(&nodes, part);
+            }
+            let [r, g, b, a] = self.classify::<S>(value);
+            [r, g, b, self.extinction::<S>(a)]
+        }
+    }
+
     /// Extinctions of opacities: −ln(1 − a) over the unit distance; NaN for NaN.
     ///
-    /// ln of the rounded u = 1 − a by Cephes' polynomial (S. Moshier, `logf`), and (1 − a − u)/u more
+    /// ln of the rounded u = 1 − a, and (1 − a − u)/u more
     /// for what was rounded away, so that small opacities keep their digits.
     ///
     /// # Safety
     /// Called from a function compiled for `S` on a machine that has it.
     #[inline(always)]
     unsafe fn extinction<S: Simd>(&self, a: S::F) -> S::F {
-        const SERIES: [f32; 9] = [
-            7.037_683_6e-2,
-            -1.151_461e-1,
-            1.167_699_8e-1,
-            -1.242_014_1e-1,
-            1.424_932_3e-1,
-            -1.666_805_8e-1,
-            2.000_071_4e-1,
-            -2.499_999_4e-1,
-            3.333_333e-1,
-        ];
         // SAFETY: the caller's promise.
         unsafe {
             let (zero, one) = (S::splat(0.0), S::splat(1.0));
             let u = S::max(S::sub(one, a), S::splat(f32::MIN_POSITIVE));
             let rounded = S::sub(S::sub(one, u), a);
-            // As a power of two times a number between √½ and √2.
-            let half = S::splat_int(std::f32::consts::FRAC_1_SQRT_2.to_bits() as i32);
-            let power = S::sar::<23>(S::sub_int(S::as_int(u), half));
-            let m = S::as_float(S::sub_int(S::as_int(u), S::shl::<23>(power)));
-            let (f, e) = (S::sub(m, one), S::to_float(power));
-            let mut series = S::splat(SERIES[0]);
-            for c in &SERIES[1..] {
-                series = S::fma(series, f, S::splat(*c));
-            }
-            let square = S::mul(f, f);
-            let mut log = S::mul(S::mul(square, f), series);
-            log = S::fma(e, S::splat(-2.121_944_4e-4), log);
-            log = S::fma(S::splat(-0.5), square, log);
-            log = S::add(f, S::add(log, S::div(rounded, u)));
-            log = S::fma(e, S::splat(0.693_359_4), log);
+            let log = power::log::<S>(u, S::div(rounded, u));
             let sigma = S::mul(S::sub(zero, log), S::splat((1.0 / self.unit) as f32));
             // Comparisons with NaN hold nowhere.
             let some = S::lt_bits(zero, a);
@@ -286,24 +335,14 @@ impl Lookup {
 /// Called from a function compiled for `S` on a machine that has it.
 #[inline(always)]
 pub unsafe fn classified<S: Simd>(table: &Lookup, values: &[f32], out: &mut [&mut [f32]], medium: bool) {
+    if let (Some(baked), true) = (&table.baked, medium) {
+        // SAFETY: the caller's promise.
+        return unsafe { baked.media::<S>(values, out) };
+    }
     for (i, value) in values.as_chunks::<LANES>().0.iter().enumerate() {
         // SAFETY: the caller's promise.
         unsafe {
-            let rgba = match &table.baked {
-                Some(baked) if medium => baked.medium::<S>(value),
-                _ => {
-                    let mut rgba = table.classify::<S>(value);
-                    if medium {
-                        rgba[3] = table.extinction::<S>(rgba[3]);
-                    }
-                    rgba
-                }
-            };
-            for (row, numbers) in out.iter_mut().zip(rgba) {
-                if let Some(to) = row.as_chunks_mut::<LANES>().0.get_mut(i) {
-                    S::store(numbers, to);
-                }
-            }
+            put::<S>(if medium { table.medium::<S>(value) } else { table.classify::<S>(value) }, i, out);
         }
     }
 }
@@ -343,7 +382,7 @@ impl Segments {
 mod tests {
     use super::*;
     use crate::fast::{dispatch, simd::Unit};
-    use volact_core::{ControlPoint, LookupTable};
+    use volact_core::LookupTable;
 
     #[test]
     fn what_is_looked_up_is_the_table() {

@@ -14,6 +14,7 @@ mod crossings;
 mod dense;
 pub mod field;
 mod flat;
+mod lit;
 pub mod lookup;
 mod skip;
 mod surroundings;
@@ -30,18 +31,19 @@ use volact_core::{
 };
 use volact_shaders::{
     Entry, Kernel, Program,
-    eval::{Function, Uniforms},
+    eval::{Field, Function, Input, Uniforms},
     signatures::Derived,
 };
 
-use super::options::Classification;
+use super::options::{Classification, Settings};
 pub use absorb::{absorb, composite};
 pub use chosen::Chosen;
 pub use crossings::Crossings;
 pub use dense::Dense;
 pub use flat::Flattened;
+pub use lit::{Lit, lit};
 use lookup::Lookup;
-pub use skip::{Rows, Skip, visible};
+pub use skip::{Rows, Skip, Take, visible, visit};
 
 /// Whether a shape is drawn by evaluating its shader's source.
 pub fn wanted(shape: &ResolvedShape) -> bool {
@@ -111,9 +113,14 @@ pub struct Shader {
     origin: DVec3,
     entry: Arc<ShaderEntry>,
     program: Program,
+    /// Whether the program is that of `gradient`.
+    lit: bool,
     classification: Classification,
+    recognise: bool,
     uniforms: ParameterMap,
     transform: DAffine3,
+    /// Parameters of a volume and a table with which it is transparent.
+    transparent: Option<(usize, usize)>,
     /// What voxels depend on: distances between samples are uniform, too.
     volumes: Vec<u64>,
     /// Tables that it looks up in, by parameter.
@@ -150,27 +157,35 @@ impl Shader {
     ///
     /// # Errors
     /// [`ActionError::Shader`] if its source is wrong.
-    pub fn new(shape: &ResolvedShape, classification: Classification, last: Option<Self>) -> Result<Self, ActionError> {
+    pub fn new(shape: &ResolvedShape, settings: &Settings, last: Option<Self>) -> Result<Self, ActionError> {
         let wrong =
             |e: volact_shaders::ShaderError| ActionError::Shader { shape: shape.name.clone(), source: e.into() };
-        let (program, tables) = match last.filter(|last| last.entry == shape.shader) {
-            Some(last) => (last.program, last.tables),
-            None => (Program::new(&shape.shader).map_err(wrong)?, BTreeMap::new()),
+        let (program, lit, tables) = match last.filter(|last| last.entry == shape.shader) {
+            Some(last) => (last.program, last.lit, last.tables),
+            None => {
+                let program = Program::new(&shape.shader).map_err(wrong)?;
+                let lit = volact_shaders::does(&program, "gradient");
+                (program, lit, BTreeMap::new())
+            }
         };
         let (transform, bounds) = (shape.state.transform, shape.world_block());
         let origin = bounds.center();
         let given = Uniforms { parameters: &shape.parameters, object_to_world: transform, origin };
-        let kernel = |entry| Kernel::new(&program, entry, &given).map_err(wrong);
+        let kernel = |entry| Kernel::with_values(&program, entry, &given).map_err(wrong);
         let optional = |entry, wanted: bool| (wanted && program.has(entry)).then(|| kernel(entry)).transpose();
         let over = shape.compositing() == Compositing::Over;
+        let shade = kernel(Entry::Shade)?;
         Ok(Self {
-            shade: kernel(Entry::Shade)?,
+            transparent: shade.transparent_with(),
+            shade,
             value: optional(Entry::Value, !over)?,
-            segment: optional(Entry::Segment, over && classification != Classification::Post)?,
+            segment: optional(Entry::Segment, over && settings.classification != Classification::Post)?,
             origin,
             entry: Arc::clone(&shape.shader),
             program,
-            classification,
+            lit,
+            classification: settings.classification,
+            recognise: settings.recognise,
             uniforms: uniforms(shape),
             transform,
             volumes: volumes(shape),
@@ -179,9 +194,10 @@ impl Shader {
     }
 
     /// Whether it is still what the shape needs.
-    pub fn serves(&self, shape: &ResolvedShape, classification: Classification) -> bool {
+    pub fn serves(&self, shape: &ResolvedShape, settings: &Settings) -> bool {
         self.entry == shape.shader
-            && self.classification == classification
+            && self.classification == settings.classification
+            && self.recognise == settings.recognise
             && self.transform == shape.state.transform
             && self.origin == shape.world_block().center()
             && self.uniforms == uniforms(shape)
@@ -222,6 +238,11 @@ impl Shader {
         self.tables.get(name).map(|table| &table.lookup)
     }
 
+    /// Whether the program is known to be that of `gradient`.
+    pub fn is_lit(&self) -> bool {
+        self.lit && self.recognise
+    }
+
     /// Whether segments are classified by both of their ends.
     pub fn pre_integrates(&self) -> bool {
         self.segment.is_some()
@@ -231,14 +252,25 @@ impl Shader {
     /// table is at the volume's value.
     pub fn transparent_with(&self) -> Option<[&str; 2]> {
         // The ends of a segment say nothing of what lies between.
-        let kernel = Some(&self.shade).filter(|_| self.segment.is_none())?;
-        let (volume, table) = kernel.transparent_with()?;
-        let parameters = &self.entry.declaration.parameters;
-        let name = |i: usize| {
-            let function = kernel.functions().get(i)?;
-            let plain = matches!(function.derived, Derived::Value | Derived::Medium | Derived::TableColor);
-            parameters.get(function.parameter).filter(|_| plain).map(|p| p.name.as_str())
-        };
+        let (volume, table) = self.transparent.filter(|_| self.segment.is_none())?;
+        let name = |i: usize| self.entry.declaration.parameters.get(i).map(|p| p.name.as_str());
         Some([name(volume)?, name(table)?])
+    }
+
+    /// The values of a parameter's volume below the first and above the second of which the medium
+    /// is transparent.
+    pub fn seen_of(&self, name: &str) -> [f32; 2] {
+        let table = self.transparent_with().filter(|[volume, _]| *volume == name).map(|[_, table]| table);
+        let lookup = table.and_then(|table| self.lookup(table));
+        lookup.map_or([f32::NEG_INFINITY, f32::INFINITY], Lookup::seen)
+    }
+
+    /// Whether the medium depends on the value of a parameter's volume at the sample's own position.
+    pub fn wants_values_of(&self, name: &str) -> bool {
+        let wanted = |input: Input| match input.field {
+            Field::Volume(p) => self.entry.declaration.parameters.get(p).is_some_and(|p| p.name == name),
+            _ => false,
+        };
+        self.segment.is_none() && self.shade.inputs().any(wanted)
     }
 }

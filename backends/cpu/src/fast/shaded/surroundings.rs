@@ -86,6 +86,15 @@ fn answer<'a>(
     }
 }
 
+/// The values of a parameter's volume; `None` where it was left out.
+pub fn value<'a>(shape: &'a ResolvedShape, shader: &'a Shader, parameter: usize, unit: Unit) -> Option<Field<'a>> {
+    let local = shape.to_object * DAffine3::from_translation(shader.origin);
+    match answer(shape, shader, Function { parameter, derived: Derived::Value }, &local, unit) {
+        Answer::Value(field) => Some(field),
+        _ => None,
+    }
+}
+
 /// What a table says; `None` for what is no table's function.
 fn classified<'a>(shape: &ResolvedShape, shader: &'a Shader, name: &str, derived: Derived) -> Option<Answer<'a>> {
     match derived {

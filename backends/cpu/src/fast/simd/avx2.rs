@@ -71,6 +71,10 @@ impl Simd for Avx2 {
         both!(|a, b| _mm256_div_ps(a, b))
     }
     #[inline(always)]
+    unsafe fn sqrt(a: Self::F) -> Self::F {
+        both!(|a| _mm256_sqrt_ps(a))
+    }
+    #[inline(always)]
     unsafe fn fma(a: Self::F, b: Self::F, c: Self::F) -> Self::F {
         both!(|a, b, c| _mm256_fmadd_ps(a, b, c))
     }

@@ -34,6 +34,7 @@ impl Simd for Avx512 {
         fn sub(a: __m512, b: __m512) -> __m512 { _mm512_sub_ps(a, b) }
         fn mul(a: __m512, b: __m512) -> __m512 { _mm512_mul_ps(a, b) }
         fn div(a: __m512, b: __m512) -> __m512 { _mm512_div_ps(a, b) }
+        fn sqrt(a: __m512) -> __m512 { _mm512_sqrt_ps(a) }
         fn fma(a: __m512, b: __m512, c: __m512) -> __m512 { _mm512_fmadd_ps(a, b, c) }
         fn min(a: __m512, b: __m512) -> __m512 { _mm512_min_ps(a, b) }
         fn max(a: __m512, b: __m512) -> __m512 { _mm512_max_ps(a, b) }
@@ -73,23 +74,29 @@ impl Simd for Avx512 {
     unsafe fn rows(base: *const u8, index: &[i32; LANES]) -> [__m512; 4] {
         // SAFETY: the caller's rows can be read.
         unsafe {
-            let row = |l: usize| _mm_loadu_ps(base.add(16 * index[l] as u32 as usize).cast());
-            // Every fourth lane, so that turning each block of four by four gives lanes in order.
-            let four = |e: usize| {
-                let v = _mm512_castps128_ps512(row(e));
-                let v = _mm512_mask_broadcast_f32x4(v, 0x00f0, row(4 + e));
-                let v = _mm512_mask_broadcast_f32x4(v, 0x0f00, row(8 + e));
-                _mm512_mask_broadcast_f32x4(v, 0xf000, row(12 + e))
-            };
-            let (a, b, c, d) = (four(0), four(1), four(2), four(3));
-            let pair = |a: __m512, b: __m512| [_mm512_unpacklo_ps(a, b), _mm512_unpackhi_ps(a, b)];
-            let ([p, q], [r, s]) = (pair(a, b), pair(c, d));
-            let double = |a: __m512, b: __m512| {
-                let (a, b) = (_mm512_castps_pd(a), _mm512_castps_pd(b));
-                [_mm512_castpd_ps(_mm512_unpacklo_pd(a, b)), _mm512_castpd_ps(_mm512_unpackhi_pd(a, b))]
-            };
-            let ([first, second], [third, fourth]) = (double(p, r), double(q, s));
-            [first, second, third, fourth]
+            turned([
+                every_fourth(base, index, 0),
+                every_fourth(base, index, 1),
+                every_fourth(base, index, 2),
+                every_fourth(base, index, 3),
+            ])
+        }
+    }
+    #[inline(always)]
+    unsafe fn between_rows(base: *const u8, index: &[i32; LANES], fraction: __m512) -> [__m512; 4] {
+        // SAFETY: the caller's rows can be read.
+        unsafe {
+            let next = base.add(16);
+            // Without closures: those are not compiled for the unit.
+            let a =
+                mix(every_fourth(base, index, 0), every_fourth(next, index, 0), _mm512_permute_ps::<0x00>(fraction));
+            let b =
+                mix(every_fourth(base, index, 1), every_fourth(next, index, 1), _mm512_permute_ps::<0x55>(fraction));
+            let c =
+                mix(every_fourth(base, index, 2), every_fourth(next, index, 2), _mm512_permute_ps::<0xaa>(fraction));
+            let d =
+                mix(every_fourth(base, index, 3), every_fourth(next, index, 3), _mm512_permute_ps::<0xff>(fraction));
+            turned([a, b, c, d])
         }
     }
 
@@ -148,6 +155,36 @@ impl Simd for Avx512 {
             }
         }
         c
+    }
+}
+
+/// Four numbers each of the lanes `e`, `4 + e`, `8 + e` and `12 + e`.
+#[inline(always)]
+unsafe fn every_fourth(base: *const u8, index: &[i32; LANES], e: usize) -> __m512 {
+    // SAFETY: the caller's rows can be read.
+    unsafe {
+        let row = |l: usize| _mm_loadu_ps(base.add(16 * index[l] as u32 as usize).cast());
+        let v = _mm512_castps128_ps512(row(e));
+        let v = _mm512_mask_broadcast_f32x4(v, 0x00f0, row(4 + e));
+        let v = _mm512_mask_broadcast_f32x4(v, 0x0f00, row(8 + e));
+        _mm512_mask_broadcast_f32x4(v, 0xf000, row(12 + e))
+    }
+}
+
+/// From what [`every_fourth`] gives of each, to all first numbers, all second ones, and so on: turning
+/// each block of four by four gives lanes in order.
+#[inline(always)]
+unsafe fn turned([a, b, c, d]: [__m512; 4]) -> [__m512; 4] {
+    // SAFETY: AVX-512 as above.
+    unsafe {
+        let pair = |a: __m512, b: __m512| [_mm512_unpacklo_ps(a, b), _mm512_unpackhi_ps(a, b)];
+        let ([p, q], [r, s]) = (pair(a, b), pair(c, d));
+        let double = |a: __m512, b: __m512| {
+            let (a, b) = (_mm512_castps_pd(a), _mm512_castps_pd(b));
+            [_mm512_castpd_ps(_mm512_unpacklo_pd(a, b)), _mm512_castpd_ps(_mm512_unpackhi_pd(a, b))]
+        };
+        let ([first, second], [third, fourth]) = (double(p, r), double(q, s));
+        [first, second, third, fourth]
     }
 }
 

@@ -102,6 +102,8 @@ pub trait Simd: Copy + 'static {
     unsafe fn mul(a: Self::F, b: Self::F) -> Self::F;
     /// a / b.
     unsafe fn div(a: Self::F, b: Self::F) -> Self::F;
+    /// √a.
+    unsafe fn sqrt(a: Self::F) -> Self::F;
     /// a · b + c, rounded once (twice on plain x86-64).
     unsafe fn fma(a: Self::F, b: Self::F, c: Self::F) -> Self::F;
     /// The smaller; `b` where `a` is NaN.
@@ -162,6 +164,19 @@ pub trait Simd: Copy + 'static {
     /// Four f32 at `base + 16·index` of every lane, which must be readable: all first ones, all
     /// second ones, and so on. Indices are unsigned.
     unsafe fn rows(base: *const u8, index: &[i32; LANES]) -> [Self::F; 4];
+    /// The same at `fraction` of the way from there to the four that follow; NaN where that is NaN.
+    #[inline(always)]
+    unsafe fn between_rows(base: *const u8, index: &[i32; LANES], fraction: Self::F) -> [Self::F; 4] {
+        // SAFETY: the caller's rows can be read.
+        unsafe {
+            let (from, to) = (Self::rows(base, index), Self::rows(base.add(16), index));
+            let mut numbers = from;
+            for c in 0..4 {
+                numbers[c] = Self::fma(fraction, Self::sub(to[c], from[c]), from[c]);
+            }
+            numbers
+        }
+    }
     /// Four bytes at each byte offset, unaligned.
     unsafe fn gather(base: *const u8, offset: Self::I) -> Self::I;
 

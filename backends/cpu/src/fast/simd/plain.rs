@@ -51,6 +51,10 @@ impl Simd for Plain {
         lanes!(|i| a[i] / b[i])
     }
     #[inline(always)]
+    unsafe fn sqrt(a: Self::F) -> Self::F {
+        lanes!(|i| a[i].sqrt())
+    }
+    #[inline(always)]
     unsafe fn fma(a: Self::F, b: Self::F, c: Self::F) -> Self::F {
         lanes!(|i| fused(a[i], b[i], c[i]))
     }

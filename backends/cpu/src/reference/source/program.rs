@@ -87,6 +87,8 @@ impl<'c> Course<'c> {
             Field::Step => s.step,
             Field::Depth => self.depth + s.t,
             Field::Value => s.value,
+            // Kernels of the reference ask for them.
+            Field::Volume(_) => f64::NAN,
             Field::Attribute(_) | Field::AttributeComponent(..) => {
                 self.cell(s.t).map_or(f64::NAN, |cell| cell.number(field, s.t))
             }
