@@ -214,3 +214,52 @@ fn a_table_left_out_is_grey_over_the_range() {
     machine.run(1, &rows, &mut Plain::new(&program, &value, &uniforms)).unwrap();
     assert_eq!(machine.output(0), [150.0]);
 }
+
+/// Values of volumes where a sample is can be inputs, where every sample has them.
+#[test]
+fn values_at_own_positions_are_inputs_where_asked_for() {
+    let parameters = || vec![required("a", ParameterType::Volume), required("b", ParameterType::Volume)];
+    let cases = [
+        ("return Medium(vec3(a(s.position)), 1.0);", vec![0]),
+        ("let p = s.position; return Medium(vec3(a(p), b(p), a(vec3(p.x, p.y, p.z))), 1.0);", vec![0, 1]),
+        ("return Medium(vec3(a(s.position.zyx)), 1.0);", vec![]),
+        ("return Medium(vec3(a(s.position + 1.0)), b(s.position));", vec![1]),
+        ("if s.position.x > 0.5 { return Medium(vec3(a(s.position)), 2.0); } return Medium(vec3(0.0), 1.0);", vec![]),
+        ("var p = s.position; p.x = p.y; return Medium(vec3(a(p)), 1.0);", vec![]),
+    ];
+    let samples: Vec<[f64; 3]> = (0..40).map(|i| [0.1, 0.37, 0.53].map(|k| (f64::from(i) * k).fract())).collect();
+    let field = |volume: usize, p: &[f64]| p[0] + 10.0 * p[1] + 100.0 * p[2] + 1000.0 * volume as f64;
+    for (body, wanted) in cases {
+        let text = format!("fn shade(s: Sample) -> Medium {{ {body} }}");
+        let program = Program::new(&entry(&text, Compositing::Over, parameters())).unwrap_or_else(|e| panic!("{e}"));
+        let map = map(&[]);
+        let uniforms = uniforms(&map);
+        let evaluate = |kernel: &Kernel<f64>| {
+            let mut environment = Of(kernel.functions().to_vec(), |f: volact_shaders::eval::Function, p: &[f64]| {
+                vec![field(f.parameter, p)]
+            });
+            let mut machine = Machine::new(kernel);
+            for (i, input) in kernel.inputs().enumerate() {
+                let [row] = machine.inputs([i]).expect("an input");
+                for (to, p) in row.iter_mut().zip(&samples) {
+                    *to = match input.field {
+                        Field::Position(axis) => p[usize::from(axis)],
+                        Field::Volume(volume) => field(volume, p),
+                        other => panic!("{other:?}"),
+                    };
+                }
+            }
+            machine.run_in_place(samples.len(), &mut environment).unwrap();
+            (0..4).map(|k| machine.output(k).to_vec()).collect::<Vec<_>>()
+        };
+        let asking = Kernel::new(&program, Entry::Shade, &uniforms).unwrap();
+        let given = Kernel::with_values(&program, Entry::Shade, &uniforms).unwrap();
+        let volumes = given.inputs().filter_map(|input| match input.field {
+            Field::Volume(volume) => Some(volume),
+            _ => None,
+        });
+        assert_eq!(volumes.collect::<Vec<_>>(), wanted, "{body}");
+        assert!(asking.inputs().all(|input| !matches!(input.field, Field::Volume(_))), "{body}");
+        assert_eq!(evaluate(&asking), evaluate(&given), "{body}");
+    }
+}

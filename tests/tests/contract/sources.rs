@@ -112,6 +112,41 @@ fn kernels_draw_what_the_sources_of_their_shaders_say() {
     }
 }
 
+/// Lit by formulas compiled beforehand, or by the instructions of its source.
+#[test]
+fn gradient_is_lit_as_its_source_says() {
+    let mut random = Random(29);
+    let mut all = registry();
+    let shipped = volact_shaders::builtin().unwrap();
+    all.add_shader(shipped.into_iter().find(|e| e.declaration.name == "gradient").unwrap()).unwrap();
+    let types = [ScalarType::U8, ScalarType::I8, ScalarType::U16, ScalarType::I16, ScalarType::F32, ScalarType::F64];
+    for round in 0..18 {
+        let data = noise(&mut random, types[round % types.len()], round % 2 == 0);
+        let (table, desc) = (table(&mut random, [0.2, 0.9, 1.0][round % 3], false), view(&mut random));
+        let look = Appearance::new("gradient")
+            .with("volume", VolumeTexture::new(&data))
+            .with("lookup_table", table)
+            .with("unit_distance", 1.0)
+            .with("model", ["blinn_phong", "phong"][round % 2])
+            .with("light", ["head", "directional", "positional"][round / 2 % 3])
+            .with("lightdir", random.vector() * 2.0 - 1.0)
+            .with("light_position", random.vector() * 20.0 - 5.0)
+            .with("specular", 0.6)
+            .with("shininess", [0.0, 1.0, 10.0, 80.0][round % 4]);
+        let shape = [Shape::around(&data, look)];
+        let turn = DQuat::from_rotation_x(random.next()) * DQuat::from_rotation_z(random.next());
+        shape[0].set_transform(DAffine3::from_scale_rotation_translation(
+            DVec3::new(1.0, 0.8, 1.3),
+            turn,
+            DVec3::new(0.3, -0.1, 0.2),
+        ));
+        let [native, source] =
+            [true, false].map(|on| picture(&all, &Setup::post(0.13).with("recognise", on), &shape, &desc));
+        assert!(source.iter().any(|c| c[3] > 0.05), "round {round}");
+        within(&format!("round {round}"), max_error(&native, &source), 1e-4);
+    }
+}
+
 /// Shaders without a kernel, in f32 and in f64 on the same lattice.
 #[test]
 fn sources_in_f32_are_those_in_f64() {
