@@ -258,8 +258,14 @@ by_unit! {
 
 by_unit! {
     /// Lays the media of rows behind what sixteen rays have seen.
-    composite(rows: &[batch::Row], medium: &[&[f32]; 4], seen: &mut [[f32; LANES]; 4], alphas: &mut [[f32; LANES]]),
-    S => shaded::composite::<S>(rows, medium, seen, alphas)
+    composite(
+        live: &[u32],
+        lengths: &[[f32; LANES]],
+        medium: &[&[f32]; 4],
+        seen: &mut [[f32; LANES]; 4],
+        alphas: &mut [[f32; LANES]]
+    ),
+    S => shaded::composite::<S>(live, lengths, medium, seen, alphas)
 }
 
 by_unit! {

@@ -1,7 +1,7 @@
 //! From extinction to the opacity of a length, sixteen at once.
 #![expect(unsafe_code, reason = "kernels of a vector unit")]
 
-use super::{batch, field::sixteen};
+use super::field::sixteen;
 use crate::fast::{
     power::exp_parts,
     simd::{LANES, Simd},
@@ -60,13 +60,15 @@ pub unsafe fn absorb<S: Simd>(medium: &[&[f32; LANES]; 4], length: f32, out: &mu
 }
 
 /// Lays rows of media, front to back, behind what sixteen rays have seen: premultiplied colour and
-/// opacity by number and lane. `alphas` takes the rows' opacities.
+/// opacity by number and lane. Rows are given by the lanes that count and by lengths: one of each
+/// row, or one of all. `alphas` takes the rows' opacities.
 ///
 /// # Safety
 /// Called from a function compiled for `S` on a machine that has it.
 #[inline(always)]
 pub unsafe fn composite<S: Simd>(
-    rows: &[batch::Row],
+    live: &[u32],
+    lengths: &[[f32; LANES]],
     medium: &[&[f32]; 4],
     seen: &mut [[f32; LANES]; 4],
     alphas: &mut [[f32; LANES]],
@@ -75,13 +77,14 @@ pub unsafe fn composite<S: Simd>(
     unsafe {
         let (zero, one) = (S::splat(0.0), S::splat(1.0));
         let mut sum = [S::load(&seen[0]), S::load(&seen[1]), S::load(&seen[2]), S::load(&seen[3])];
-        for (i, (row, kept)) in rows.iter().zip(alphas).enumerate() {
+        let each = usize::from(lengths.len() > 1);
+        for (i, (live, kept)) in live.iter().zip(alphas).enumerate() {
             let mut numbers = [zero; 4];
             for c in 0..4 {
                 numbers[c] = S::load(sixteen(medium[c], i * LANES));
             }
-            let (alpha, some) = opacity::<S>(numbers, S::load(&row.lengths()));
-            let some = some & row.live;
+            let (alpha, some) = opacity::<S>(numbers, S::load(&lengths[i * each]));
+            let some = some & live;
             let alpha = S::select(some, alpha, zero);
             S::store(alpha, kept);
             let weight = S::mul(S::sub(one, sum[3]), alpha);

@@ -79,12 +79,17 @@ impl Row {
         if self.base.is_nan() { self.length } else { [self.length[0]; LANES] }
     }
 
-    /// A function of the lanes, the idle ones like the first live one: nothing may come of where
-    /// they are, not even an endless loop.
+    /// See [`lanes`].
     fn lanes(&self) -> [usize; LANES] {
-        let lead = (self.live.trailing_zeros() as usize).min(LANES - 1);
-        std::array::from_fn(|l| if self.live >> l & 1 == 1 { l } else { lead })
+        lanes(self.live)
     }
+}
+
+/// A function of the lanes, the idle ones like the first live one: nothing may come of where they
+/// are, not even an endless loop.
+fn lanes(live: u32) -> [usize; LANES] {
+    let lead = (live.trailing_zeros() as usize).min(LANES - 1);
+    std::array::from_fn(|l| if live >> l & 1 == 1 { l } else { lead })
 }
 
 /// Rows of a batch. What rows do not need of their slots is left as it was.
@@ -198,6 +203,8 @@ pub struct Worker<'a> {
     maps: Vec<DAffine3>,
     /// Opacities of the rows that were composited last.
     pub alphas: Vec<[f32; LANES]>,
+    /// Lanes that count, and lengths, of rows that are composited.
+    pub strips: (Vec<u32>, Vec<[f32; LANES]>),
     /// Room for what a walk finds.
     pub found: Option<Box<skip::Rows>>,
 }
@@ -293,6 +300,7 @@ impl<'a> Evaluator<'a> {
             places: [const { Vec::new() }; 3],
             maps: Vec::new(),
             alphas: vec![[0.0; LANES]; ROWS],
+            strips: (Vec::new(), Vec::new()),
             found: None,
         });
         worker.rows.clear();
@@ -362,6 +370,26 @@ impl<'a> Evaluator<'a> {
         let mut asked = self.surroundings.asked(maps);
         let result = machine.run_in_place(rows.len() * LANES, &mut asked);
         // The first one is told; which one that is does not matter.
+        result.map_err(|overrun| self.failed.set(overrun)).is_ok()
+    }
+
+    /// Whether all that it needs of samples is what a walk finds.
+    pub fn needs_only_values(&self) -> bool {
+        self.inputs.len() == 1 && self.brought == Some(0) && self.lit.is_none()
+    }
+
+    /// Evaluates rows that a walk found; as [`run`](Self::run). Only of those that
+    /// [need only values](Self::needs_only_values).
+    pub fn run_found(&self, found: &skip::Rows, worker: &mut Worker<'a>) -> bool {
+        let (live, values) = found.parts();
+        let Some([to]) = worker.machine.inputs([0]).filter(|_| self.failed.get().is_none()) else { return false };
+        to[..values.len() * LANES].copy_from_slice(values.as_flattened());
+        for (live, to) in live.iter().zip(to.as_chunks_mut::<LANES>().0).filter(|(live, _)| **live != ALL) {
+            let numbers = *to;
+            *to = lanes(*live).map(|l| numbers[l]);
+        }
+        worker.natively = false;
+        let result = worker.machine.run_in_place(values.len() * LANES, &mut self.surroundings.asked(&[]));
         result.map_err(|overrun| self.failed.set(overrun)).is_ok()
     }
 

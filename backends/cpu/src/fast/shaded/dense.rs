@@ -105,8 +105,12 @@ impl<'a> Dense<'a> {
 
     /// Adds a row of whole segments of the chunk that begins with segment `first`, with values there.
     fn add(&self, rows: &mut Rows, first: i64, row: (usize, u32), value: Option<&[f32; LANES]>) {
-        let t = ((first + row.0 as i64) as f64 + 0.5) * self.step;
-        rows.push_even(row, (t, first as f64 * self.step), self.step as f32, value);
+        rows.push_even(row, (self.middle(first, row.0), first as f64 * self.step), self.step as f32, value);
+    }
+
+    /// The middle of a segment of the chunk that begins with segment `first`.
+    fn middle(&self, first: i64, number: usize) -> f64 {
+        ((first + number as i64) as f64 + 0.5) * self.step
     }
 
     /// Calls `add` with the rows of the chunk that begins with segment `first`, and their lanes;
@@ -160,7 +164,12 @@ impl<'a> Dense<'a> {
                 match &self.skip {
                     Some(skip) => {
                         let before = done(&sight);
+                        let values = self.medium.needs_only_values();
                         let mut take = |first: i64, found: &skip::Rows| {
+                            if values && worker.rows.is_empty() {
+                                self.lay_found(first, found, worker, &mut sight);
+                                return done(&sight);
+                            }
                             for (number, live, values) in found.iter() {
                                 self.push((first, number, live), Some(values), rays, worker, &mut sight);
                             }
@@ -235,19 +244,48 @@ impl<'a> Dense<'a> {
 
     /// Lays a worker's rows behind what was seen.
     fn lay(&self, rays: Rays<'_>, worker: &mut Worker<'a>, sight: &mut Sight) {
-        let mut alphas = std::mem::take(&mut worker.alphas);
         if self.medium.run(rays, worker) {
-            let medium = [0, 1, 2, 3].map(|c| worker.output(c));
-            let Sight { seen, depth, threshold } = sight;
-            let (before, threshold) = (seen[3], *threshold);
-            dispatch::composite(self.unit, &worker.rows, &medium, seen, &mut alphas);
-            let rows = worker.rows.iter().zip(&alphas);
-            for l in (0..LANES).filter(|l| before[*l] < threshold && seen[3][*l] >= threshold) {
-                depth[l] = reached(l, before[l], threshold, rows.clone());
-            }
+            let (mut alphas, mut strips) = (std::mem::take(&mut worker.alphas), std::mem::take(&mut worker.strips));
+            let (live, lengths) = (&mut strips.0, &mut strips.1);
+            live.clear();
+            lengths.clear();
+            live.extend(worker.rows.iter().map(|row| row.live));
+            lengths.extend(worker.rows.iter().map(Row::lengths));
+            let place = |row: usize, l: usize| (worker.rows[row].t(l), worker.rows[row].length(l));
+            self.composite((live, lengths), worker, sight, &mut alphas, place);
+            (worker.alphas, worker.strips) = (alphas, strips);
         }
-        worker.alphas = alphas;
         worker.rows.clear();
+    }
+
+    /// Lays what a walk found in the chunk that begins with segment `first`.
+    fn lay_found(&self, first: i64, found: &skip::Rows, worker: &mut Worker<'a>, sight: &mut Sight) {
+        if self.medium.run_found(found, worker) {
+            let mut alphas = std::mem::take(&mut worker.alphas);
+            let (length, (live, _)) = (self.step as f32, found.parts());
+            let place = |row: usize, _: usize| (self.middle(first, found.number(row)), length);
+            self.composite((live, &[[length; LANES]]), worker, sight, &mut alphas, place);
+            worker.alphas = alphas;
+        }
+    }
+
+    /// Lays the media that a worker has; `place` says where a row's sample is in a lane, and for
+    /// what length it stands.
+    fn composite(
+        &self,
+        (live, lengths): (&[u32], &[[f32; LANES]]),
+        worker: &Worker<'a>,
+        sight: &mut Sight,
+        alphas: &mut [[f32; LANES]],
+        place: impl Fn(usize, usize) -> (f64, f32),
+    ) {
+        let medium = [0, 1, 2, 3].map(|c| worker.output(c));
+        let (before, threshold) = (sight.seen[3], sight.threshold);
+        dispatch::composite(self.unit, live, lengths, &medium, &mut sight.seen, alphas);
+        for l in (0..LANES).filter(|l| before[*l] < threshold && sight.seen[3][*l] >= threshold) {
+            let rows = (0..live.len()).filter(|row| live[*row] >> l & 1 == 1);
+            sight.depth[l] = reached(before[l], threshold, rows.map(|row| (place(row, l), alphas[row][l])));
+        }
     }
 }
 
@@ -258,20 +296,15 @@ struct Sight {
     threshold: f32,
 }
 
-/// Where a lane reached the threshold among rows; at the end of the last one where rounding tells
-/// otherwise.
-fn reached<'r>(
-    l: usize,
-    mut opacity: f32,
-    threshold: f32,
-    rows: impl Iterator<Item = (&'r Row, &'r [f32; LANES])>,
-) -> f64 {
+/// Where a lane reached the threshold among rows, given by place, length and opacity; at the end of
+/// the last one where rounding tells otherwise.
+fn reached(mut opacity: f32, threshold: f32, rows: impl Iterator<Item = ((f64, f32), f32)>) -> f64 {
     let mut end = f64::INFINITY;
-    for (row, alpha) in rows.filter(|(row, _)| row.live >> l & 1 == 1) {
-        let (length, after) = (f64::from(row.length(l)), opacity + (1.0 - opacity) * alpha[l]);
-        let start = row.t(l) - 0.5 * length;
+    for ((t, length), alpha) in rows {
+        let (length, after) = (f64::from(length), opacity + (1.0 - opacity) * alpha);
+        let start = t - 0.5 * length;
         if after >= threshold {
-            return start + f64::from(part_of(opacity, alpha[l], threshold)) * length;
+            return start + f64::from(part_of(opacity, alpha, threshold)) * length;
         }
         (opacity, end) = (after, start + length);
     }

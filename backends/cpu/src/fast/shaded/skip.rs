@@ -49,6 +49,16 @@ impl Default for Rows {
 }
 
 impl Rows {
+    /// By row: the lanes that count, and values.
+    pub fn parts(&self) -> (&[u32], &[[f32; LANES]]) {
+        (&self.live[..self.count], &self.values[..self.count])
+    }
+
+    /// Which row of the chunk is the one of an index.
+    pub fn number(&self, index: usize) -> usize {
+        usize::from(self.rows[index])
+    }
+
     /// The rows, their lanes, and values there.
     pub fn iter(&self) -> impl Iterator<Item = (usize, u32, &[f32; LANES])> {
         let rows = self.rows[..self.count].iter().zip(&self.live).zip(&self.values);

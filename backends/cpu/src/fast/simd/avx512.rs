@@ -86,16 +86,11 @@ impl Simd for Avx512 {
     unsafe fn between_rows(base: *const u8, index: &[i32; LANES], fraction: __m512) -> [__m512; 4] {
         // SAFETY: the caller's rows can be read.
         unsafe {
-            let next = base.add(16);
             // Without closures: those are not compiled for the unit.
-            let a =
-                mix(every_fourth(base, index, 0), every_fourth(next, index, 0), _mm512_permute_ps::<0x00>(fraction));
-            let b =
-                mix(every_fourth(base, index, 1), every_fourth(next, index, 1), _mm512_permute_ps::<0x55>(fraction));
-            let c =
-                mix(every_fourth(base, index, 2), every_fourth(next, index, 2), _mm512_permute_ps::<0xaa>(fraction));
-            let d =
-                mix(every_fourth(base, index, 3), every_fourth(next, index, 3), _mm512_permute_ps::<0xff>(fraction));
+            let a = every_fourth_between(base, index, 0, _mm512_permute_ps::<0x00>(fraction));
+            let b = every_fourth_between(base, index, 1, _mm512_permute_ps::<0x55>(fraction));
+            let c = every_fourth_between(base, index, 2, _mm512_permute_ps::<0xaa>(fraction));
+            let d = every_fourth_between(base, index, 3, _mm512_permute_ps::<0xff>(fraction));
             turned([a, b, c, d])
         }
     }
@@ -168,6 +163,20 @@ unsafe fn every_fourth(base: *const u8, index: &[i32; LANES], e: usize) -> __m51
         let v = _mm512_mask_broadcast_f32x4(v, 0x00f0, row(4 + e));
         let v = _mm512_mask_broadcast_f32x4(v, 0x0f00, row(8 + e));
         _mm512_mask_broadcast_f32x4(v, 0xf000, row(12 + e))
+    }
+}
+
+/// Four numbers each of the lanes `e`, `4 + e`, `8 + e` and `12 + e`, between a row and the one after.
+#[inline(always)]
+unsafe fn every_fourth_between(base: *const u8, index: &[i32; LANES], e: usize, t: __m512) -> __m512 {
+    // SAFETY: the caller's rows can be read, and those after them.
+    unsafe {
+        let rows = |l: usize| _mm256_loadu_pd(base.add(16 * index[l] as u32 as usize).cast());
+        let near = _mm512_insertf64x4::<1>(_mm512_castpd256_pd512(rows(e)), rows(4 + e));
+        let far = _mm512_insertf64x4::<1>(_mm512_castpd256_pd512(rows(8 + e)), rows(12 + e));
+        let (near, far) = (_mm512_castpd_ps(near), _mm512_castpd_ps(far));
+        let from = _mm512_shuffle_f32x4::<0b10_00_10_00>(near, far);
+        mix(from, _mm512_shuffle_f32x4::<0b11_01_11_01>(near, far), t)
     }
 }
 
