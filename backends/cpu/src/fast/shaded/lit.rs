@@ -125,7 +125,10 @@ impl Lit<'_> {
             };
             let cosine = dot::<S>(normal, to_light);
             let bright = S::lt_bits(zero, cosine) & known;
-            let mirrored = if self.phong {
+            let mirrored = if let Light::Head = self.light {
+                // Light and eye are in one direction.
+                if self.phong { S::fma(S::add(cosine, cosine), cosine, minus) } else { cosine }
+            } else if self.phong {
                 let mirror = plus::<S>(times::<S>(to_light, minus), S::add(cosine, cosine), normal);
                 dot::<S>(mirror, view)
             } else {
