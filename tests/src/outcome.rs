@@ -10,10 +10,13 @@ pub struct Sheet {
     /// Rows.
     pub height: usize,
     /// What was expected.
+    #[serde(with = "packed")]
     pub expected: Vec<[f32; 4]>,
     /// What was drawn.
+    #[serde(with = "packed")]
     pub actual: Vec<[f32; 4]>,
     /// The tolerance of each pixel.
+    #[serde(with = "packed")]
     pub tolerance: Vec<f32>,
 }
 
@@ -55,6 +58,9 @@ pub struct Check {
     pub method: Option<String>,
     /// The scene, in the words of a scene file where it can be one.
     pub scene: Option<String>,
+    /// Files that the scene names: the volumes.
+    #[serde(skip)]
+    pub files: Vec<(String, Vec<u8>)>,
 }
 
 /// What a case came to.
@@ -166,5 +172,71 @@ impl Run {
             "[{}] {passed} passed, {failed} failed, {skipped} skipped, {expected} expected failures{none}",
             self.subject
         )
+    }
+}
+
+/// Numbers as base64 of little-endian f32.
+mod packed {
+    use base64::{Engine as _, engine::general_purpose::STANDARD};
+    use serde::{Deserialize as _, Deserializer, Serializer, de::Error as _};
+
+    /// What is packed: numbers, or several at once.
+    pub trait Numbers: Sized {
+        /// How many numbers are one.
+        const COUNT: usize;
+        /// The numbers of one.
+        fn numbers(&self) -> impl Iterator<Item = f32>;
+        /// One of its numbers.
+        fn from(numbers: &[f32]) -> Self;
+    }
+
+    impl Numbers for f32 {
+        const COUNT: usize = 1;
+        fn numbers(&self) -> impl Iterator<Item = f32> {
+            std::iter::once(*self)
+        }
+        fn from(numbers: &[f32]) -> Self {
+            numbers[0]
+        }
+    }
+
+    impl Numbers for [f32; 4] {
+        const COUNT: usize = 4;
+        fn numbers(&self) -> impl Iterator<Item = f32> {
+            self.iter().copied()
+        }
+        fn from(numbers: &[f32]) -> Self {
+            [numbers[0], numbers[1], numbers[2], numbers[3]]
+        }
+    }
+
+    pub fn serialize<T: Numbers, S: Serializer>(values: &[T], serializer: S) -> Result<S::Ok, S::Error> {
+        let bytes: Vec<u8> = values.iter().flat_map(Numbers::numbers).flat_map(f32::to_le_bytes).collect();
+        serializer.serialize_str(&STANDARD.encode(bytes))
+    }
+
+    pub fn deserialize<'de, T: Numbers, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<T>, D::Error> {
+        let text = String::deserialize(deserializer)?;
+        let bytes = STANDARD.decode(text).map_err(D::Error::custom)?;
+        if bytes.len() % (4 * T::COUNT) != 0 {
+            return Err(D::Error::custom(format!("{} bytes, wanted a multiple of {}", bytes.len(), 4 * T::COUNT)));
+        }
+        let numbers: Vec<f32> = bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
+        Ok(numbers.chunks_exact(T::COUNT).map(T::from).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sheets_survive_json() {
+        let pixels = vec![[0.5f32, -1.0, f32::INFINITY, 1e-30]; 6];
+        let sheet =
+            Sheet { width: 3, height: 2, expected: pixels.clone(), actual: pixels, tolerance: vec![1e-6; 6] };
+        let text = serde_json::to_string(&sheet).unwrap();
+        assert_eq!(serde_json::from_str::<Sheet>(&text).unwrap(), sheet);
+        assert!(serde_json::from_str::<Sheet>(&text.replace("\"expected\":\"", "\"expected\":\"AAAA")).is_err());
     }
 }

@@ -148,6 +148,7 @@ mod tests {
             sheet: None,
             method: None,
             scene: None,
+            files: Vec::new(),
         }
     }
 

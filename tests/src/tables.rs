@@ -6,6 +6,7 @@
 //! max δ/α where the table has some opacity, and n·max δ where it has next to none; the threshold
 //! between the two is chosen to make the sum smallest. Pre-integrated pairs of nodes are off by twice
 //! as much, and by a quarter of Δ times the change of slope at control points beside the diagonal.
+//! Shaders that are `evaluated` look up extinction to 1e-6 of an optical depth over a unit.
 
 use volact_core::{Compositing, ControlPoint, LookupTable, Method, ParameterValue, Shape, table::ResolvedTable};
 
@@ -14,19 +15,39 @@ use crate::{method::Lattice, tolerance::Sizes};
 /// Places looked at in each piece between control points.
 const PLACES: usize = 48;
 
+/// What is tabulated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kind {
+    /// What a segment adds.
+    Nodes,
+    /// What a segment adds, by the values at both of its ends.
+    Pairs,
+    /// Extinction, for a program.
+    Program,
+}
+
+/// How wrong optical depth over a unit may be in tables of programs.
+const PROGRAM: f64 = 1e-6;
+
 /// The part of a tolerance that tables take.
 pub fn tabulated(shapes: &[Shape], method: &Method, lattice: Lattice) -> f64 {
     let Some(step) = lattice.step() else { return 0.0 };
-    if method.table_width < 2 {
+    let evaluated = method.classification.contains("evaluated");
+    if method.table_width < 2 && !evaluated {
         return 0.0;
     }
     let segments = (Sizes::of(shapes).diagonal / step).max(1.0);
     let pairs = matches!(lattice, Lattice::Rays { segments: true, .. } | Lattice::Planes { segments: true, .. });
-    let part = |shape: &Shape| of_shape(shape, method.table_width, (step, segments), pairs);
+    let kind = match (evaluated, pairs) {
+        (true, _) => Kind::Program,
+        (_, true) => Kind::Pairs,
+        _ => Kind::Nodes,
+    };
+    let part = |shape: &Shape| of_shape(shape, method.table_width, (step, segments), kind);
     shapes.iter().map(part).sum()
 }
 
-fn of_shape(shape: &Shape, width: usize, (step, segments): (f64, f64), pairs: bool) -> f64 {
+fn of_shape(shape: &Shape, width: usize, (step, segments): (f64, f64), kind: Kind) -> f64 {
     let state = shape.state();
     let table = state.parameters.get("lookup_table");
     let unit = state.parameters.get("unit_distance").and_then(ParameterValue::as_float).unwrap_or(1.0);
@@ -34,9 +55,9 @@ fn of_shape(shape: &Shape, width: usize, (step, segments): (f64, f64), pairs: bo
         e.declaration.name == state.shader && e.compositing == Compositing::Over
     });
     match table {
-        Some(ParameterValue::Table(table)) if over && unit > 0.0 => {
+        Some(ParameterValue::Table(table)) if (over || kind == Kind::Program) && unit > 0.0 => {
             let range = state.volume().map_or([0.0, 1.0], |v| v.range());
-            worst(table, range, width, (step / unit, segments), pairs)
+            worst(table, range, width, (step / unit, segments), kind)
         }
         _ => 0.0,
     }
@@ -48,14 +69,14 @@ fn added(rgba: [f64; 4], h: f64) -> [f64; 4] {
     [rgba[0] * alpha, rgba[1] * alpha, rgba[2] * alpha, alpha]
 }
 
-fn worst(table: &LookupTable, range: [f64; 2], width: usize, (h, segments): (f64, f64), pairs: bool) -> f64 {
+fn worst(table: &LookupTable, range: [f64; 2], width: usize, (h, segments): (f64, f64), kind: Kind) -> f64 {
     let points = table.points(range);
     let (Some(first), Some(last)) = (points.first(), points.last()) else { return 0.0 };
-    let delta = (last.value - first.value) / (width - 1) as f64;
+    let delta = (last.value - first.value) / (width.max(2) - 1) as f64;
     let resolved = table.resolve(range);
     // Error and opacity at each place.
-    let mut places: Vec<[f64; 2]> = points.windows(2).flat_map(|p| piece(&resolved, p, delta, h, pairs)).collect();
-    if pairs {
+    let mut places: Vec<[f64; 2]> = points.windows(2).flat_map(|p| piece(&resolved, p, delta, h, kind)).collect();
+    if kind == Kind::Pairs {
         places.extend(corners(&resolved, &points, delta, h));
     }
     places.sort_by(|a, b| a[1].total_cmp(&b[1]));
@@ -77,7 +98,7 @@ fn worst(table: &LookupTable, range: [f64; 2], width: usize, (h, segments): (f64
 }
 
 /// Errors of curvature within a piece between two control points.
-fn piece(table: &ResolvedTable, ends: &[ControlPoint], delta: f64, h: f64, pairs: bool) -> Vec<[f64; 2]> {
+fn piece(table: &ResolvedTable, ends: &[ControlPoint], delta: f64, h: f64, kind: Kind) -> Vec<[f64; 2]> {
     let (a, b) = (ends[0].value, ends[1].value);
     let d = (b - a) / (PLACES + 1) as f64;
     if d <= 0.0 {
@@ -87,8 +108,14 @@ fn piece(table: &ResolvedTable, ends: &[ControlPoint], delta: f64, h: f64, pairs
         let at = |k: usize| added(table.classify((a + d * k as f64).clamp(a, b - 1e-9 * (b - a))), h);
         let (before, here, after) = (at(i - 1), at(i), at(i + 1));
         let bend = (0..4).map(|c| (before[c] - 2.0 * here[c] + after[c]).abs()).fold(0.0, f64::max) / (d * d);
-        let twice = if pairs { 2.0 } else { 1.0 };
-        [twice * bend * delta * delta / 8.0, here[3]]
+        let error = match kind {
+            Kind::Nodes => bend * delta * delta / 8.0,
+            Kind::Pairs => bend * delta * delta / 4.0,
+            // What is opaque is not tabulated, and what is transparent is so exactly.
+            Kind::Program if here[3] > 0.0 => PROGRAM * h * (1.0 - here[3]),
+            Kind::Program => 0.0,
+        };
+        [error, here[3]]
     };
     (1..=PLACES).map(place).collect()
 }
@@ -112,13 +139,13 @@ mod tests {
     #[test]
     fn four_times_as_many_nodes_cost_a_sixteenth() {
         let table = greys(&[(0.0, 0.2, 0.05), (100.0, 0.9, 0.8)]);
-        let [coarse, fine] = [65usize, 257].map(|w| worst(&table, [0.0, 1.0], w, (0.5, 50.0), false));
+        let [coarse, fine] = [65usize, 257].map(|w| worst(&table, [0.0, 1.0], w, (0.5, 50.0), Kind::Nodes));
         assert!(coarse > 1e-7 && (coarse / fine - 16.0).abs() < 0.5, "{coarse} {fine}");
     }
 
     #[test]
     fn a_segment_of_one_unit_of_one_grey_is_linear_and_costs_nothing() {
         let table = greys(&[(0.0, 0.5, 0.1), (100.0, 0.5, 0.8)]);
-        assert!(worst(&table, [0.0, 1.0], 65, (1.0, 50.0), false) < 1e-9);
+        assert!(worst(&table, [0.0, 1.0], 65, (1.0, 50.0), Kind::Nodes) < 1e-9);
     }
 }

@@ -6,7 +6,8 @@
 //!
 //! - *the frame*: u·max(1, c), since frames are f32;
 //! - *sums*: 4·u·√n, two products and two sums a segment whose roundings are as often up as down
-//!   (N. Higham, *Accuracy and Stability of Numerical Algorithms*, 2002, section 2.8);
+//!   (N. Higham, *Accuracy and Stability of Numerical Algorithms*, 2002, section 2.8), and 16·u for the
+//!   lengths and exponentials of the two segments that a shape cuts;
 //!   of fixed-point targets half a step a segment, which do not cancel;
 //! - *positions*: η/δ·|T(δ) − T(0)|, where T(δ) is the true picture of the scene moved by δ voxels
 //!   obliquely. A position of index N rounds by u·N in each of some four operations, the seven
@@ -108,7 +109,7 @@ impl Tolerance {
         let sums = if precision.fixed {
             precision.blend * segments
         } else {
-            4.0 * precision.arithmetic.max(precision.blend) * segments.sqrt()
+            precision.arithmetic.max(precision.blend) * (4.0 * segments.sqrt() + 16.0)
         };
         let eta = precision.arithmetic * (4.0 * sizes.samples + 16.0) + precision.weight;
         let mut most = [0.0f64; 7];

@@ -50,6 +50,11 @@ pub fn scene(shapes: &[Shape], desc: &FrameDesc) -> String {
     out
 }
 
+/// The files that the scene names.
+pub fn files(shapes: &[Shape]) -> Vec<(String, Vec<u8>)> {
+    Volumes::of(shapes).iter().map(|(name, volume)| (format!("{name}.nrrd"), data::nrrd(volume))).collect()
+}
+
 fn image(out: &mut String, desc: &FrameDesc) {
     let v = desc.viewport();
     let [r, g, b, a] = desc.background.map(f64::from).map(number);

@@ -22,9 +22,6 @@ pub type Wanted<'a> = &'a dyn Fn(usize, usize) -> Option<[f64; 4]>;
 /// The result of a call that should have failed.
 pub type Found<T> = Result<T, ActionError>;
 
-/// Room above which a tolerance needs a reason.
-pub const LOOSE: f64 = 10.0;
-
 impl Rig<'_> {
     /// Draws and compares with the reference on the lattice that the frame says it was drawn on.
     ///
@@ -110,6 +107,7 @@ impl Rig<'_> {
             sheet,
             method: Some(line(&found.method)),
             scene: Some(reproduce::scene(&scene.shapes, &scene.desc)),
+            files: reproduce::files(&scene.shapes),
         });
     }
 
@@ -202,6 +200,7 @@ impl Rig<'_> {
             sheet: None,
             method: None,
             scene: scene.map(|s| reproduce::scene(&s.shapes, &s.desc)),
+            files: scene.map(|s| reproduce::files(&s.shapes)).unwrap_or_default(),
         });
     }
 
@@ -268,6 +267,7 @@ impl Rig<'_> {
             sheet,
             method: Some(line(&frame.method)),
             scene: Some(reproduce::scene(&scene.shapes, &scene.desc)),
+            files: reproduce::files(&scene.shapes),
         });
     }
 }
