@@ -38,7 +38,8 @@ pub enum Need {
 impl Need {
     /// What is missing, in words, of an action with these capabilities.
     pub fn missing(&self, caps: &Caps, declaration: &Declaration, registry: &Registry) -> Option<String> {
-        let known = |names: &Option<Vec<String>>, name: &str| names.as_ref().is_none_or(|n| n.iter().any(|n| n == name));
+        let known =
+            |names: &Option<Vec<String>>, name: &str| names.as_ref().is_none_or(|n| n.iter().any(|n| n == name));
         let (met, reason) = match self {
             Self::Shader(name) => {
                 let Some(entry) = registry.shaders().get(name) else {

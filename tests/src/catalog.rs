@@ -46,7 +46,9 @@ mod tests {
         let names: BTreeSet<_> = all.iter().map(Case::id).collect();
         assert_eq!(names.len(), all.len(), "names are keys");
         assert!(all.len() >= 200, "{} cases", all.len());
-        assert!(all.iter().all(|c| !c.about.is_empty() && c.name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')));
+        assert!(
+            all.iter().all(|c| !c.about.is_empty() && c.name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_'))
+        );
     }
 
     #[test]

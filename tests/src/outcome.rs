@@ -233,8 +233,7 @@ mod tests {
     #[test]
     fn sheets_survive_json() {
         let pixels = vec![[0.5f32, -1.0, f32::INFINITY, 1e-30]; 6];
-        let sheet =
-            Sheet { width: 3, height: 2, expected: pixels.clone(), actual: pixels, tolerance: vec![1e-6; 6] };
+        let sheet = Sheet { width: 3, height: 2, expected: pixels.clone(), actual: pixels, tolerance: vec![1e-6; 6] };
         let text = serde_json::to_string(&sheet).unwrap();
         assert_eq!(serde_json::from_str::<Sheet>(&text).unwrap(), sheet);
         assert!(serde_json::from_str::<Sheet>(&text.replace("\"expected\":\"", "\"expected\":\"AAAA")).is_err());

@@ -43,7 +43,11 @@ impl Subject {
     ///
     /// # Errors
     /// Those of the action.
-    pub fn action(&self, registry: &Registry, wishes: &[(String, ParameterValue)]) -> Result<Box<dyn RenderAction>, ActionError> {
+    pub fn action(
+        &self,
+        registry: &Registry,
+        wishes: &[(String, ParameterValue)],
+    ) -> Result<Box<dyn RenderAction>, ActionError> {
         let mut options = self.options.clone();
         for (name, value) in wishes {
             let declared = self.declaration.parameter(name).is_some_and(|p| p.accept(value).is_ok());

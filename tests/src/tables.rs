@@ -51,9 +51,9 @@ fn of_shape(shape: &Shape, width: usize, (step, segments): (f64, f64), kind: Kin
     let state = shape.state();
     let table = state.parameters.get("lookup_table");
     let unit = state.parameters.get("unit_distance").and_then(ParameterValue::as_float).unwrap_or(1.0);
-    let over = volact_core::shader::builtin().iter().any(|e| {
-        e.declaration.name == state.shader && e.compositing == Compositing::Over
-    });
+    let over = volact_core::shader::builtin()
+        .iter()
+        .any(|e| e.declaration.name == state.shader && e.compositing == Compositing::Over);
     match table {
         Some(ParameterValue::Table(table)) if (over || kind == Kind::Program) && unit > 0.0 => {
             let range = state.volume().map_or([0.0, 1.0], |v| v.range());

@@ -9,8 +9,7 @@ use volact_conformance::{outcome::Status, rig::registry, runner::Suite, subject:
 use volact_core::{Options, ParameterValue};
 
 /// The actions, with options beside those that cases wish.
-const SUBJECTS: &[(&str, &[(&str, &str)])] =
-    &[("cpu", &[]), ("cpu", &[("recognise", "false")]), ("reference", &[])];
+const SUBJECTS: &[(&str, &[(&str, &str)])] = &[("cpu", &[]), ("cpu", &[("recognise", "false")]), ("reference", &[])];
 
 /// What may be skipped: action, case, and a part of the reason.
 const ALLOWED: &[(&str, &str, &str)] = &[

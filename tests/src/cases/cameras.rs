@@ -54,11 +54,18 @@ fn views(topic: &mut Topic) {
 }
 
 fn perspectives(topic: &mut Topic) {
-    for (name, fov, distance) in [("narrow", 4.0, 160.0), ("usual", 35.0, 17.0), ("wide", 110.0, 7.5), ("fisheye", 150.0, 6.0)] {
-        topic.case(format!("field_of_view_{name}"), "perspective by the vertical field of view in degrees", move |rig| {
-            let eye = CENTER + DVec3::new(0.6, -1.0, 0.45).normalize() * distance;
-            rig.lattice("picture", &scene(Camera::perspective(eye, CENTER, DVec3::Z, fov)), &How::step(0.3)).map(|_| ())
-        });
+    for (name, fov, distance) in
+        [("narrow", 4.0, 160.0), ("usual", 35.0, 17.0), ("wide", 110.0, 7.5), ("fisheye", 150.0, 6.0)]
+    {
+        topic.case(
+            format!("field_of_view_{name}"),
+            "perspective by the vertical field of view in degrees",
+            move |rig| {
+                let eye = CENTER + DVec3::new(0.6, -1.0, 0.45).normalize() * distance;
+                rig.lattice("picture", &scene(Camera::perspective(eye, CENTER, DVec3::Z, fov)), &How::step(0.3))
+                    .map(|_| ())
+            },
+        );
     }
     for (name, eye) in [("inside", CENTER + DVec3::new(0.3, -0.2, 0.4)), ("on_a_face", DVec3::new(3.1, 0.0, 3.3))] {
         topic.case(format!("eye_{name}"), "the eye may be in the volume: rays begin there", move |rig| {
@@ -107,9 +114,10 @@ fn matrices(topic: &mut Topic) {
 /// Near and far cut, along the view axis.
 fn planes(topic: &mut Topic) {
     let eye = CENTER + DVec3::new(0.6, -1.0, 0.45).normalize() * 17.0;
-    for (name, projection) in
-        [("perspective", Projection::Perspective { fov_y: 35.0 }), ("orthographic", Projection::Orthographic { height: 11.0 })]
-    {
+    for (name, projection) in [
+        ("perspective", Projection::Perspective { fov_y: 35.0 }),
+        ("orthographic", Projection::Orthographic { height: 11.0 }),
+    ] {
         for (which, near, far) in [("near", 16.2, f64::INFINITY), ("far", 0.0, 17.4), ("both", 15.7, 18.1)] {
             topic.case(format!("{which}_in_{name}"), "a ray's interval is cut by near and far", move |rig| {
                 let camera = Camera::LookAt { eye, target: CENTER, up: DVec3::Z, projection, near, far };
@@ -134,7 +142,8 @@ fn frames(topic: &mut Topic) {
         scene.desc.viewport = Some(v);
         let frame = rig.lattice("picture", &scene, &How::step(0.3))?;
         let beside = |i: usize| !(v.x..v.x + v.width).contains(&(i % 37)) || !(v.y..v.y + v.height).contains(&(i / 37));
-        let clean = (0..37 * 29).filter(|&i| beside(i)).all(|i| frame.color[i] == [0.0; 4] && frame.depth[i] == f32::INFINITY);
+        let clean =
+            (0..37 * 29).filter(|&i| beside(i)).all(|i| frame.color[i] == [0.0; 4] && frame.depth[i] == f32::INFINITY);
         rig.holds("beside", clean, "pixels beside the viewport are empty");
         Ok(())
     });

@@ -6,8 +6,8 @@ use std::sync::{
 };
 
 use volact_core::{
-    Aabb, Block, Buffer, Bulk, Clip, ClipRegion, Filter, Opaque, OpaqueDepth, Plane, Roi, ScalarType, Shape,
-    Volume, VolumeDesc, VolumeTexture,
+    Aabb, Block, Buffer, Bulk, Clip, ClipRegion, Filter, Opaque, OpaqueDepth, Plane, Roi, ScalarType, Shape, Volume,
+    VolumeDesc, VolumeTexture,
     glam::{DAffine3, DVec3},
 };
 
@@ -84,22 +84,29 @@ fn shapes(topic: &mut Topic) {
         }),
     ];
     for (name, change) in changes {
-        topic.case(name, "after a change the frame is what a fresh action draws", move |rig| changed(rig, plain, change));
+        topic.case(name, "after a change the frame is what a fresh action draws", move |rig| {
+            changed(rig, plain, change)
+        });
     }
     for shader in ["mip", "average", "gradient"] {
-        topic.needing(&[Need::Shader(shader)], format!("shader_to_{shader}"), "switching a shader, and back", move |rig| {
-            let how = How::step(0.3);
-            let scene = plain();
-            let mut action = rig.action(&how)?;
-            let first = rig.draw_with(&mut *action, &scene)?;
-            scene.shapes[0].set_shader(shader);
-            let (switched, fresh) = (rig.draw_with(&mut *action, &scene)?, rig.draw(&scene, &how)?);
-            rig.same("switched", &scene, &switched, &fresh);
-            scene.shapes[0].set_shader("lut");
-            let back = rig.draw_with(&mut *action, &scene)?;
-            rig.same("and back", &scene, &back, &first);
-            Ok(())
-        });
+        topic.needing(
+            &[Need::Shader(shader)],
+            format!("shader_to_{shader}"),
+            "switching a shader, and back",
+            move |rig| {
+                let how = How::step(0.3);
+                let scene = plain();
+                let mut action = rig.action(&how)?;
+                let first = rig.draw_with(&mut *action, &scene)?;
+                scene.shapes[0].set_shader(shader);
+                let (switched, fresh) = (rig.draw_with(&mut *action, &scene)?, rig.draw(&scene, &how)?);
+                rig.same("switched", &scene, &switched, &fresh);
+                scene.shapes[0].set_shader("lut");
+                let back = rig.draw_with(&mut *action, &scene)?;
+                rig.same("and back", &scene, &back, &first);
+                Ok(())
+            },
+        );
     }
     topic.needing(&[Need::Shader("gradient")], "number_of_a_shader", "a number that a shader reads", |rig| {
         let make = || around([Shape::around(&usual(), crate::scene::look("gradient", warm(), 1.0))]);
@@ -161,7 +168,8 @@ fn data(topic: &mut Topic) {
         let dims = [7usize, 6, 8];
         let bytes = encode(ScalarType::U8, &values(dims, rule));
         let memory = Arc::new(Shared(bytes.iter().map(|_| 50u8.into()).collect()));
-        let data = Volume::new(VolumeDesc::new(dims, ScalarType::U8, 1), Buffer::shared(memory.clone())).expect("a volume");
+        let data =
+            Volume::new(VolumeDesc::new(dims, ScalarType::U8, 1), Buffer::shared(memory.clone())).expect("a volume");
         let scene = around([lut(&data, warm(), 1.0)]);
         let mut action = rig.action(&How::step(0.3))?;
         rig.draw_with(&mut *action, &scene)?;

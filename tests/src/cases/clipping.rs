@@ -39,10 +39,14 @@ fn cut(region: ClipRegion) -> Scene {
 fn planes(topic: &mut Topic) {
     for (name, axis) in AXES {
         for (side, sign) in [("front", 1.0), ("back", -1.0)] {
-            topic.case(format!("plane_across_{name}_keeps_its_{side}"), "a plane keeps what its normal points to", move |rig| {
-                let region = ClipRegion::plane(plane(CENTER + 0.3 * axis, sign * axis));
-                rig.lattice("picture", &cut(region), &How::step(0.3)).map(|_| ())
-            });
+            topic.case(
+                format!("plane_across_{name}_keeps_its_{side}"),
+                "a plane keeps what its normal points to",
+                move |rig| {
+                    let region = ClipRegion::plane(plane(CENTER + 0.3 * axis, sign * axis));
+                    rig.lattice("picture", &cut(region), &How::step(0.3)).map(|_| ())
+                },
+            );
         }
     }
     topic.case("plane_oblique", "a plane in any direction", |rig| {
@@ -87,12 +91,20 @@ fn closed(topic: &mut Topic) {
         for own in [false, true] {
             let whose = if own { "shape" } else { "frame" };
             let clip = clip.clone();
-            topic.case(format!("{name}_of_the_{whose}"), "what all regions keep is drawn, with its true length", move |rig| {
-                let shape = slab();
-                let mut scene = Scene::new([shape.clone()], along_y(0.9, 1.1));
-                if own { shape.set_clip(clip.clone()) } else { scene.desc.clip = clip.clone() }
-                rig.pixel("length", &scene, &How::step(0.25), [absorbed(0.3, length); 4]).map(|_| ())
-            });
+            topic.case(
+                format!("{name}_of_the_{whose}"),
+                "what all regions keep is drawn, with its true length",
+                move |rig| {
+                    let shape = slab();
+                    let mut scene = Scene::new([shape.clone()], along_y(0.9, 1.1));
+                    if own {
+                        shape.set_clip(clip.clone())
+                    } else {
+                        scene.desc.clip = clip.clone()
+                    }
+                    rig.pixel("length", &scene, &How::step(0.25), [absorbed(0.3, length); 4]).map(|_| ())
+                },
+            );
         }
     }
 }

@@ -93,13 +93,18 @@ fn kinds(topic: &mut Topic) {
         let scene = Scene::new([slab(9.0), slab(0.0), slab(4.0)], ray());
         one(rig, "depth", &scene, &How::step(0.4), 7.0 + 9.0 + 0.5f64.ln() / 0.75f64.ln() - 2.0)
     });
-    topic.needing(&[Need::Shader("isosurface")], "isosurface", "at the surface that reaches the threshold", move |rig| {
-        let data = volume([3, 9, 3], volact_core::ScalarType::F32, |p| p.y);
-        let levels = colors(&[(2.5, [1.0; 3], 0.3), (5.25, [1.0; 3], 0.5)]);
-        let look = volact_core::Appearance::new("isosurface").with("volume", VolumeTexture::new(&data));
-        let scene = Scene::new([Shape::around(&data, look.with("surfaces", levels))], ray());
-        one(rig, "depth", &scene, &How::step(0.4), 12.25)
-    });
+    topic.needing(
+        &[Need::Shader("isosurface")],
+        "isosurface",
+        "at the surface that reaches the threshold",
+        move |rig| {
+            let data = volume([3, 9, 3], volact_core::ScalarType::F32, |p| p.y);
+            let levels = colors(&[(2.5, [1.0; 3], 0.3), (5.25, [1.0; 3], 0.5)]);
+            let look = volact_core::Appearance::new("isosurface").with("volume", VolumeTexture::new(&data));
+            let scene = Scene::new([Shape::around(&data, look.with("surfaces", levels))], ray());
+            one(rig, "depth", &scene, &How::step(0.4), 12.25)
+        },
+    );
     topic.needing(&[Need::Shader("surface")], "surface", "at an opaque surface", move |rig| {
         let points = vec![DVec3::new(-9.0, 3.5, -9.0), DVec3::new(9.0, 3.5, -9.0), DVec3::new(0.5, 3.5, 9.0)];
         let surface = volact_core::Surface::new(points.into(), volact_core::Buffer::from_vec(vec![0u32, 1, 2]));
@@ -110,10 +115,16 @@ fn kinds(topic: &mut Topic) {
         let mesh = crate::meshes::field(crate::meshes::corner(40.0), |_| 0.0, greys(&[(0.0, 1.0, 0.25)]), 1.0);
         one(rig, "depth", &Scene::new([mesh], ray()), &How::step(0.4), 7.0 + 0.5f64.ln() / 0.75f64.ln())
     });
-    topic.needing(&[Need::Shader("mip")], "pictures_of_values_have_none", "shapes that are one picture leave depth alone", move |rig| {
-        let shape = Shape::around(&constant(1.0, [1, 3, 1]), crate::scene::look("mip", greys(&[(0.0, 1.0, 1.0)]), 1.0));
-        one(rig, "depth", &Scene::new([shape], ray()), &How::step(0.4), f64::INFINITY)
-    });
+    topic.needing(
+        &[Need::Shader("mip")],
+        "pictures_of_values_have_none",
+        "shapes that are one picture leave depth alone",
+        move |rig| {
+            let shape =
+                Shape::around(&constant(1.0, [1, 3, 1]), crate::scene::look("mip", greys(&[(0.0, 1.0, 1.0)]), 1.0));
+            one(rig, "depth", &Scene::new([shape], ray()), &How::step(0.4), f64::INFINITY)
+        },
+    );
 }
 
 /// Whole pictures against the lattice: a ray's depth moves as much as rounding of T over its slope.
@@ -122,7 +133,10 @@ fn pictures(topic: &mut Topic) {
         let name = format!("picture_at_{}", (threshold * 10.0).round());
         topic.case(name, "depth of a picture agrees with the lattice", move |rig| {
             let table = colors(&[(0.0, [0.2, 0.4, 0.9], 0.1), (100.0, [1.0, 0.6, 0.2], 0.5)]);
-            for (label, mut scene) in [("orthographic", around([lut(&super::stock::usual(), table.clone(), 1.0)])), ("perspective", through([lut(&super::stock::usual(), table, 1.0)]))] {
+            for (label, mut scene) in [
+                ("orthographic", around([lut(&super::stock::usual(), table.clone(), 1.0)])),
+                ("perspective", through([lut(&super::stock::usual(), table, 1.0)])),
+            ] {
                 scene.desc.depth_threshold = threshold;
                 let frame = rig.draw(&scene, &How::step(0.3))?;
                 let lattice = Lattice::of(&frame.method).map_err(crate::case::Stop::Skip)?;

@@ -68,13 +68,23 @@ fn threads(topic: &mut Topic) {
     type Make = Box<dyn Fn() -> Scene + Send + Sync>;
     let scenes: Vec<(&str, &[Need], Make)> = vec![
         ("volume", &[], Box::new(crowd)),
-        ("gradient", &[Need::Shader("gradient")], Box::new(|| {
-            through([shaded("gradient", &VolumeTexture::new(&usual()), warm(), 1.0)])
-        })),
-        ("mesh", &[Need::Shader("attribute")], Box::new(|| {
-            through([field(bent([3, 4, 2], DVec3::new(6.0, 5.0, 7.0), 0.1), super::stock::rule, warm(), 1.0)])
-        })),
-        ("mip", &[Need::Shader("mip")], Box::new(|| through([shaded("mip", &VolumeTexture::new(&usual()), warm(), 1.0)]))),
+        (
+            "gradient",
+            &[Need::Shader("gradient")],
+            Box::new(|| through([shaded("gradient", &VolumeTexture::new(&usual()), warm(), 1.0)])),
+        ),
+        (
+            "mesh",
+            &[Need::Shader("attribute")],
+            Box::new(|| {
+                through([field(bent([3, 4, 2], DVec3::new(6.0, 5.0, 7.0), 0.1), super::stock::rule, warm(), 1.0)])
+            }),
+        ),
+        (
+            "mip",
+            &[Need::Shader("mip")],
+            Box::new(|| through([shaded("mip", &VolumeTexture::new(&usual()), warm(), 1.0)])),
+        ),
     ];
     for (name, more, make) in scenes {
         let needs: Vec<_> = needs.iter().chain(more).cloned().collect();

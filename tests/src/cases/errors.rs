@@ -150,7 +150,11 @@ fn shapes(topic: &mut Topic) {
         ("out_of_bounds", Box::new(move || around(good().with("component", 9i64))), &["head", "component", "0 to 3"]),
         ("unit_of_zero", Box::new(move || around(good().with("unit_distance", 0.0))), &["head", "unit_distance"]),
         ("unit_negative", Box::new(move || around(good().with("unit_distance", -1.0))), &["head", "unit_distance"]),
-        ("unit_not_a_number", Box::new(move || around(good().with("unit_distance", f64::NAN))), &["head", "unit_distance"]),
+        (
+            "unit_not_a_number",
+            Box::new(move || around(good().with("unit_distance", f64::NAN))),
+            &["head", "unit_distance"],
+        ),
         (
             "no_volume",
             Box::new(|| Shape::new(Block::new(DVec3::ZERO, DVec3::ONE).expect("a block"), good()).named("head")),
@@ -256,26 +260,35 @@ fn options(topic: &mut Topic) {
         Ok(())
     });
     topic.needing(&[Need::Option("sample_distance")], "step_of_zero", "a step must be positive", |rig| {
-        for (label, step) in [("zero", 0.0), ("negative", -1.0), ("not a number", f64::NAN), ("infinite", f64::INFINITY)] {
+        for (label, step) in
+            [("zero", 0.0), ("negative", -1.0), ("not a number", f64::NAN), ("infinite", f64::INFINITY)]
+        {
             let mut action = rig.action(&How::default())?;
             let kind = |e: &ActionError| matches!(e, ActionError::Options { .. });
             rig.refused(label, action.set_option("sample_distance", step.into()), kind, &["sample_distance"]);
         }
         Ok(())
     });
-    topic.needing(&[Need::Option("sample_distance")], "step_too_fine", "a step so fine that no frame would end", |rig| {
-        if rig.subject().options.contains_key("sample_distance") {
-            return Err(Stop::Skip("set by the user".into()));
-        }
-        let scene = around([lut(&usual(), warm(), 1.0)]);
-        let mut action = rig.action(&How::step(1e-12))?;
-        match draw(&mut *action, &scene.shapes, &scene.desc) {
-            // An action that has no lattice has no use for a step.
-            Ok(frame) if frame.method.sample_distance == 0.0 => rig.holds("no lattice", true, "there is no lattice"),
-            found => rig.refused("draw", found, |e| matches!(e, ActionError::Limit { .. }), &["sample"]),
-        }
-        Ok(())
-    });
+    topic.needing(
+        &[Need::Option("sample_distance")],
+        "step_too_fine",
+        "a step so fine that no frame would end",
+        |rig| {
+            if rig.subject().options.contains_key("sample_distance") {
+                return Err(Stop::Skip("set by the user".into()));
+            }
+            let scene = around([lut(&usual(), warm(), 1.0)]);
+            let mut action = rig.action(&How::step(1e-12))?;
+            match draw(&mut *action, &scene.shapes, &scene.desc) {
+                // An action that has no lattice has no use for a step.
+                Ok(frame) if frame.method.sample_distance == 0.0 => {
+                    rig.holds("no lattice", true, "there is no lattice")
+                }
+                found => rig.refused("draw", found, |e| matches!(e, ActionError::Limit { .. }), &["sample"]),
+            }
+            Ok(())
+        },
+    );
     topic.case("mistyped_option", "an option of another type", |rig| {
         let declared = rig.subject().declaration.parameters.clone();
         let Some(option) = declared.first() else { return Err(Stop::Skip("it has no option".into())) };

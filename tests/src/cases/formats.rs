@@ -1,8 +1,6 @@
 //! Formats and ranges: scalar types, slope and intercept, components, what 0 and 1 are.
 
-use volact_core::{
-    Appearance, Buffer, ScalarType, Shape, Volume, VolumeDesc, VolumeTexture, glam::DVec3,
-};
+use volact_core::{Appearance, Buffer, ScalarType, Shape, Volume, VolumeDesc, VolumeTexture, glam::DVec3};
 
 use super::stock::{around, rule, warm, waves};
 use crate::{
@@ -97,28 +95,38 @@ fn components(topic: &mut Topic) {
         });
     }
     for n in [2usize, 3, 4] {
-        topic.needing(SIMPLE, format!("picture_of_{n}_components"), "each component is interpolated on its own", move |rig| {
-            let dims = [5, 4, 6];
-            let parts: Vec<_> =
-                (0..n).map(|c| values(dims, |p| 2.5 * rule(p + DVec3::splat(1.7 * c as f64)))).collect();
-            let all: Vec<_> = (0..parts[0].len()).flat_map(|i| parts.iter().map(move |p| p[i])).collect();
-            let bytes = Buffer::from_vec(encode(ScalarType::U8, &all));
-            let data = Volume::new(VolumeDesc::new(dims, ScalarType::U8, n), bytes).expect("a volume");
-            let shape = Shape::around(&data, Appearance::new("simple").with("unit_distance", 2.0));
-            rig.lattice("picture", &around([shape]), &How::step(0.3)).map(|_| ())
-        });
+        topic.needing(
+            SIMPLE,
+            format!("picture_of_{n}_components"),
+            "each component is interpolated on its own",
+            move |rig| {
+                let dims = [5, 4, 6];
+                let parts: Vec<_> =
+                    (0..n).map(|c| values(dims, |p| 2.5 * rule(p + DVec3::splat(1.7 * c as f64)))).collect();
+                let all: Vec<_> = (0..parts[0].len()).flat_map(|i| parts.iter().map(move |p| p[i])).collect();
+                let bytes = Buffer::from_vec(encode(ScalarType::U8, &all));
+                let data = Volume::new(VolumeDesc::new(dims, ScalarType::U8, n), bytes).expect("a volume");
+                let shape = Shape::around(&data, Appearance::new("simple").with("unit_distance", 2.0));
+                rig.lattice("picture", &around([shape]), &How::step(0.3)).map(|_| ())
+            },
+        );
     }
     for component in 0..2i64 {
-        topic.needing(LUT, format!("table_reads_component_{component}"), "a table reads the component named", move |rig| {
-            let dims = [5, 4, 6];
-            let (one, two) = (values(dims, rule), values(dims, |p| 100.0 - rule(p + DVec3::ONE)));
-            let pairs: Vec<_> = one.into_iter().zip(two).flat_map(|(a, b)| [a, b]).collect();
-            let bytes = Buffer::from_vec(encode(ScalarType::I16, &pairs));
-            let data = Volume::new(VolumeDesc::new(dims, ScalarType::I16, 2), bytes).expect("a volume");
-            let shape = lut(&data, warm(), 1.0);
-            shape.set_parameter("component", component);
-            rig.lattice("picture", &around([shape]), &How::step(0.3)).map(|_| ())
-        });
+        topic.needing(
+            LUT,
+            format!("table_reads_component_{component}"),
+            "a table reads the component named",
+            move |rig| {
+                let dims = [5, 4, 6];
+                let (one, two) = (values(dims, rule), values(dims, |p| 100.0 - rule(p + DVec3::ONE)));
+                let pairs: Vec<_> = one.into_iter().zip(two).flat_map(|(a, b)| [a, b]).collect();
+                let bytes = Buffer::from_vec(encode(ScalarType::I16, &pairs));
+                let data = Volume::new(VolumeDesc::new(dims, ScalarType::I16, 2), bytes).expect("a volume");
+                let shape = lut(&data, warm(), 1.0);
+                shape.set_parameter("component", component);
+                rig.lattice("picture", &around([shape]), &How::step(0.3)).map(|_| ())
+            },
+        );
     }
 }
 
@@ -129,12 +137,17 @@ fn ranges(topic: &mut Topic) {
         ("clamped_above", [0.0, 25.5], 1.0),
         ("clamped_below", [102.0, 204.0], 0.0),
     ] {
-        topic.needing(SIMPLE, format!("range_{name}"), "the texture's range says which values are 0 and 1", move |rig| {
-            let texture = solid(1).with_range(range).expect("a range");
-            let shape = Shape::around_texture(&texture, Appearance::new("simple").with("unit_distance", 1.0));
-            let wanted = if value == 1.0 { [1.0; 4] } else { [value * value, value * value, value * value, value] };
-            rig.pixel("grey", &Scene::new([shape], along_y(0.5, 0.5)), &How::step(0.4), wanted).map(|_| ())
-        });
+        topic.needing(
+            SIMPLE,
+            format!("range_{name}"),
+            "the texture's range says which values are 0 and 1",
+            move |rig| {
+                let texture = solid(1).with_range(range).expect("a range");
+                let shape = Shape::around_texture(&texture, Appearance::new("simple").with("unit_distance", 1.0));
+                let wanted = if value == 1.0 { [1.0; 4] } else { [value * value, value * value, value * value, value] };
+                rig.pixel("grey", &Scene::new([shape], along_y(0.5, 0.5)), &How::step(0.4), wanted).map(|_| ())
+            },
+        );
     }
     topic.needing(SIMPLE, "range_of_floats_is_that_of_the_data", "floats take the data's own range", |rig| {
         let data = volume([2, 2, 2], ScalarType::F32, |p| 10.0 + 30.0 * p.x);

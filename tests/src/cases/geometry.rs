@@ -1,7 +1,8 @@
 //! Every geometry: with numbers of its own, with a volume in it, and as what breaks others.
 
 use volact_core::{
-    Block, Buffer, CellType, CellTypes, Cylinder, Geometry, Mesh, ParameterValue, Shape, Sphere, Surface, VolumeTexture, glam::DVec3,
+    Block, Buffer, CellType, CellTypes, Cylinder, Geometry, Mesh, ParameterValue, Shape, Sphere, Surface,
+    VolumeTexture, glam::DVec3,
 };
 
 use super::stock::{absorbed, around, rule, through, usual, warm};
@@ -36,7 +37,14 @@ fn cell(kind: CellType) -> Mesh {
             .flat_map(|z| [p(0.0, 0.0, z), p(4.0, 0.0, z), p(4.0, 4.0, z), p(0.0, 4.0, z)])
             .collect(),
         CellType::Wedge => {
-            vec![p(0.0, 0.0, 0.0), p(5.0, 0.0, 0.0), p(0.0, 0.0, 5.0), p(0.0, 4.0, 0.0), p(5.0, 4.0, 0.0), p(0.0, 4.0, 5.0)]
+            vec![
+                p(0.0, 0.0, 0.0),
+                p(5.0, 0.0, 0.0),
+                p(0.0, 0.0, 5.0),
+                p(0.0, 4.0, 0.0),
+                p(5.0, 4.0, 0.0),
+                p(0.0, 4.0, 5.0),
+            ]
         }
         CellType::Pyramid => {
             vec![p(-2.0, 0.0, -2.0), p(4.0, 0.0, -2.0), p(4.0, 0.0, 4.0), p(-2.0, 0.0, 4.0), p(1.0, 4.0, 1.0)]
@@ -57,36 +65,53 @@ fn chords(topic: &mut Topic) {
             rig.pixel("middle", &scene, &How::step(0.25), [0.7 * alpha, 0.7 * alpha, 0.7 * alpha, alpha]).map(|_| ())
         });
     }
-    topic.needing(ATTRIBUTE, "every_interval_of_a_gap", "every interval of a non-convex mesh, not first-in to last-out", |rig| {
-        // Two corners apart along y in one mesh: 3, a gap of 4, 3 again.
-        let at = |y: f64| [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z].map(|a| a * 4.0 + DVec3::Y * y);
-        let mesh = tetrahedra([at(0.0), at(7.0)].concat(), &[[0, 1, 2, 3], [4, 5, 6, 7]]);
-        let shape = field(mesh, |_| 1.0, greys(&[(1.0, 1.0, 0.3)]), 1.0);
-        let alpha = absorbed(0.3, 6.0);
-        rig.pixel("both", &Scene::new([shape], along_y(0.5, 0.5)), &How::step(0.25), [alpha; 4]).map(|_| ())
-    });
-    topic.needing(ATTRIBUTE, "order_within_a_mesh", "colours in the order of the ray, whatever the order of cells", |rig| {
-        let at = |y: f64| [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z].map(|a| a * 4.0 + DVec3::Y * y);
-        for (label, cells) in [("near first", [[0u32, 1, 2, 3], [4, 5, 6, 7]]), ("far first", [[4, 5, 6, 7], [0, 1, 2, 3]])] {
-            let mesh = tetrahedra([at(0.0), at(7.0)].concat(), &cells);
-            let table = colors(&[(0.0, [1.0, 0.0, 0.0], 0.3), (1.0, [0.0, 0.0, 1.0], 0.3)]);
-            let shape = field(mesh, |p| f64::from(u8::from(p.y > 6.5)), table, 1.0);
-            let alpha = absorbed(0.3, 3.0);
-            let wanted = [alpha, 0.0, (1.0 - alpha) * alpha, 1.0 - (1.0 - alpha).powi(2)];
-            rig.pixel(label, &Scene::new([shape], along_y(0.5, 0.5)), &How::step(0.25), wanted)?;
-        }
-        Ok(())
-    });
-    topic.needing(ATTRIBUTE, "rays_along_grid_lines", "vertices, edges and faces on a ray neither crack nor count twice", |rig| {
-        let shape = field(bent([4, 4, 4], DVec3::ONE, 0.0), |_| 0.0, greys(&[(0.0, 1.0, 0.4)]), 1.0);
-        for x in [0.25, 0.5, 0.3] {
-            for z in [0.25, 0.5, 0.625] {
-                let scene = Scene::new([shape.clone()], along_y(x, z));
-                rig.pixel(&format!("{x}, {z}"), &scene, &How::step(0.05), [0.4; 4])?;
+    topic.needing(
+        ATTRIBUTE,
+        "every_interval_of_a_gap",
+        "every interval of a non-convex mesh, not first-in to last-out",
+        |rig| {
+            // Two corners apart along y in one mesh: 3, a gap of 4, 3 again.
+            let at = |y: f64| [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z].map(|a| a * 4.0 + DVec3::Y * y);
+            let mesh = tetrahedra([at(0.0), at(7.0)].concat(), &[[0, 1, 2, 3], [4, 5, 6, 7]]);
+            let shape = field(mesh, |_| 1.0, greys(&[(1.0, 1.0, 0.3)]), 1.0);
+            let alpha = absorbed(0.3, 6.0);
+            rig.pixel("both", &Scene::new([shape], along_y(0.5, 0.5)), &How::step(0.25), [alpha; 4]).map(|_| ())
+        },
+    );
+    topic.needing(
+        ATTRIBUTE,
+        "order_within_a_mesh",
+        "colours in the order of the ray, whatever the order of cells",
+        |rig| {
+            let at = |y: f64| [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z].map(|a| a * 4.0 + DVec3::Y * y);
+            for (label, cells) in
+                [("near first", [[0u32, 1, 2, 3], [4, 5, 6, 7]]), ("far first", [[4, 5, 6, 7], [0, 1, 2, 3]])]
+            {
+                let mesh = tetrahedra([at(0.0), at(7.0)].concat(), &cells);
+                let table = colors(&[(0.0, [1.0, 0.0, 0.0], 0.3), (1.0, [0.0, 0.0, 1.0], 0.3)]);
+                let shape = field(mesh, |p| f64::from(u8::from(p.y > 6.5)), table, 1.0);
+                let alpha = absorbed(0.3, 3.0);
+                let wanted = [alpha, 0.0, (1.0 - alpha) * alpha, 1.0 - (1.0 - alpha).powi(2)];
+                rig.pixel(label, &Scene::new([shape], along_y(0.5, 0.5)), &How::step(0.25), wanted)?;
             }
-        }
-        Ok(())
-    });
+            Ok(())
+        },
+    );
+    topic.needing(
+        ATTRIBUTE,
+        "rays_along_grid_lines",
+        "vertices, edges and faces on a ray neither crack nor count twice",
+        |rig| {
+            let shape = field(bent([4, 4, 4], DVec3::ONE, 0.0), |_| 0.0, greys(&[(0.0, 1.0, 0.4)]), 1.0);
+            for x in [0.25, 0.5, 0.3] {
+                for z in [0.25, 0.5, 0.625] {
+                    let scene = Scene::new([shape.clone()], along_y(x, z));
+                    rig.pixel(&format!("{x}, {z}"), &scene, &How::step(0.05), [0.4; 4])?;
+                }
+            }
+            Ok(())
+        },
+    );
     topic.needing(ATTRIBUTE, "ring_of_hexahedra", "a hole in a mesh is a hole", |rig| {
         let shape = field(tube(0.4, [12, 2, 2]), |p| 100.0 * p.z, warm(), 0.3);
         rig.lattice("picture", &around([shape]), &How::default()).map(|_| ())
@@ -103,10 +128,15 @@ fn fields(topic: &mut Topic) {
         });
     }
     for (name, n, strength) in [("straight", [3, 2, 4], 0.0), ("bent", [4, 3, 3], 0.14)] {
-        topic.needing(ATTRIBUTE, format!("structured_{name}"), "hexahedra are split from their lowest vertex", move |rig| {
-            let shape = field(bent(n, DVec3::ONE, strength), wave, warm(), 0.3);
-            rig.lattice("picture", &around([shape]), &How::default()).map(|_| ())
-        });
+        topic.needing(
+            ATTRIBUTE,
+            format!("structured_{name}"),
+            "hexahedra are split from their lowest vertex",
+            move |rig| {
+                let shape = field(bent(n, DVec3::ONE, strength), wave, warm(), 0.3);
+                rig.lattice("picture", &around([shape]), &How::default()).map(|_| ())
+            },
+        );
     }
     for kind in CellType::ALL {
         topic.needing(ATTRIBUTE, format!("field_in_a_{}", kind.name()), "cells mean their tessellation", move |rig| {
@@ -114,16 +144,22 @@ fn fields(topic: &mut Topic) {
             rig.lattice("picture", &around([shape]), &How::default()).map(|_| ())
         });
     }
-    topic.needing(ATTRIBUTE, "inverted_and_collapsed", "inverted and collapsed cells neither crack nor draw twice", move |rig| {
-        let made = cube(24).tessellate().expect("a mesh");
-        let mut cells = made.tetrahedra.clone();
-        cells.iter_mut().step_by(3).for_each(|c| c.swap(0, 1));
-        cells.push([0, 1, 1, 2]);
-        let mesh = tetrahedra(made.vertices.iter().collect(), &cells);
-        let (odd, plain) = (through([field(mesh, wave, warm(), 0.3)]), through([field(cube(24), wave, warm(), 0.3)]));
-        let (a, b) = (rig.draw(&odd, &How::default())?, rig.draw(&plain, &How::default())?);
-        rig.alike("variant", &odd, &a, &b)
-    });
+    topic.needing(
+        ATTRIBUTE,
+        "inverted_and_collapsed",
+        "inverted and collapsed cells neither crack nor draw twice",
+        move |rig| {
+            let made = cube(24).tessellate().expect("a mesh");
+            let mut cells = made.tetrahedra.clone();
+            cells.iter_mut().step_by(3).for_each(|c| c.swap(0, 1));
+            cells.push([0, 1, 1, 2]);
+            let mesh = tetrahedra(made.vertices.iter().collect(), &cells);
+            let (odd, plain) =
+                (through([field(mesh, wave, warm(), 0.3)]), through([field(cube(24), wave, warm(), 0.3)]));
+            let (a, b) = (rig.draw(&odd, &How::default())?, rig.draw(&plain, &How::default())?);
+            rig.alike("variant", &odd, &a, &b)
+        },
+    );
 }
 
 /// A volume in something that is no block.
@@ -132,17 +168,23 @@ fn holding(topic: &mut Topic) {
     let center = DVec3::new(3.0, 2.5, 3.5);
     let makers: Vec<(&str, Box<dyn Fn() -> Shape + Send + Sync>)> = vec![
         ("sphere", Box::new(move || Shape::new(Sphere::new(center, 2.9, 12).expect("a ball"), inside()))),
-        ("cylinder", Box::new(move || {
-            let ends = [center - DVec3::new(2.0, 1.0, 2.5), center + DVec3::new(2.0, 1.0, 2.5)];
-            Shape::new(Cylinder::new(ends, 2.0, 12).expect("a cylinder"), inside())
-        })),
+        (
+            "cylinder",
+            Box::new(move || {
+                let ends = [center - DVec3::new(2.0, 1.0, 2.5), center + DVec3::new(2.0, 1.0, 2.5)];
+                Shape::new(Cylinder::new(ends, 2.0, 12).expect("a cylinder"), inside())
+            }),
+        ),
         ("bent_grid", Box::new(move || Shape::new(bent([2, 3, 2], DVec3::new(6.0, 5.0, 7.0), 0.12), inside()))),
         ("tetrahedron", Box::new(move || Shape::new(corner(7.0), inside()))),
-        ("ring", Box::new(move || {
-            let made = tube(0.4, [9, 1, 1]).tessellate().expect("a tube");
-            let points = made.vertices.iter().map(|p| p * 2.6 + center).collect();
-            Shape::new(tetrahedra(points, &made.tetrahedra), inside())
-        })),
+        (
+            "ring",
+            Box::new(move || {
+                let made = tube(0.4, [9, 1, 1]).tessellate().expect("a tube");
+                let points = made.vertices.iter().map(|p| p * 2.6 + center).collect();
+                Shape::new(tetrahedra(points, &made.tetrahedra), inside())
+            }),
+        ),
     ];
     for (name, make) in makers {
         let about = "a mesh is a region of interest: the volume is drawn inside it";
@@ -173,7 +215,8 @@ fn deformed(topic: &mut Topic) {
         let mesh = cube(6);
         let wide = mesh.points().iter().map(|u| u * 2.0 - 0.5).collect();
         let mesh = mesh.with_texture_coordinates(wide).expect("as many");
-        let look = look("lut", greys(&[(1.0, 1.0, 0.6)]), 1.0).with("volume", VolumeTexture::new(&constant(1.0, [2, 2, 2])));
+        let look =
+            look("lut", greys(&[(1.0, 1.0, 0.6)]), 1.0).with("volume", VolumeTexture::new(&constant(1.0, [2, 2, 2])));
         let shape = Shape::new(mesh, look);
         for (x, length) in [(0.5, 0.5), (0.3, 0.5), (0.2, 0.0)] {
             let scene = Scene::new([shape.clone()], along_y(x, 0.4));

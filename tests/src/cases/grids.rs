@@ -50,7 +50,12 @@ fn ramps(topic: &mut Topic) {
                 let wanted = move |x: usize, y: usize| {
                     let p = rays(x, y);
                     let outside = (0..3).any(|a| a != view && !(0.0..=size[a]).contains(&p[a]));
-                    Some(if outside { [0.0; 4] } else { let v = p[ramp] / top; [v, v, v, 1.0] })
+                    Some(if outside {
+                        [0.0; 4]
+                    } else {
+                        let v = p[ramp] / top;
+                        [v, v, v, 1.0]
+                    })
                 };
                 rig.closed("ramp", &scene, &How::step(0.25), &wanted).map(|_| ())
             });
@@ -77,11 +82,9 @@ fn dims(topic: &mut Topic) {
             lattice(rig, lut(&waves(dims, ScalarType::F32), warm(), 1.0))
         });
     }
-    for (name, spacing) in [
-        ("x", DVec3::new(2.0, 1.0, 0.5)),
-        ("y", DVec3::new(0.5, 2.0, 1.0)),
-        ("z", DVec3::new(1.0, 0.5, 2.0)),
-    ] {
+    for (name, spacing) in
+        [("x", DVec3::new(2.0, 1.0, 0.5)), ("y", DVec3::new(0.5, 2.0, 1.0)), ("z", DVec3::new(1.0, 0.5, 2.0))]
+    {
         topic.case(format!("spacing_widest_along_{name}"), "the extent is spacing × (N − 1)", move |rig| {
             let data = placed(VolumeDesc { spacing, ..VolumeDesc::new([5, 6, 4], ScalarType::F32, 1) }, rule);
             lattice(rig, lut(&data, warm(), 1.0))

@@ -35,7 +35,12 @@ fn managing(topic: &mut Topic) {
         let found = rig.draw_with(&mut *action, &scene)?;
         rig.same("bits", &scene, &found, &wanted);
         ok(action.unmanage(&scene.shapes[0]))?;
-        rig.refused("unmanaged once", action.unmanage(&scene.shapes[0]), |e| matches!(e, volact_core::ActionError::NotManaged { .. }), &[]);
+        rig.refused(
+            "unmanaged once",
+            action.unmanage(&scene.shapes[0]),
+            |e| matches!(e, volact_core::ActionError::NotManaged { .. }),
+            &[],
+        );
         Ok(())
     });
     topic.case("managed_and_not_drawn", "managing without drawing is how an application prefetches", |rig| {
@@ -160,15 +165,19 @@ fn recovery(topic: &mut Topic) {
         }),
     ];
     for (name, wrong) in wrongs {
-        topic.case(format!("usable_after_{name}"), "after an error an action is usable, and no frame is open", move |rig| {
-            let scene = around([shape()]);
-            let mut action = rig.action(&How::step(0.4))?;
-            let before = rig.draw_with(&mut *action, &scene)?;
-            rig.holds("refused", wrong(&mut *action, &scene), "the wrong call is refused");
-            let after = rig.draw_with(&mut *action, &scene)?;
-            rig.same("bits", &scene, &after, &before);
-            Ok(())
-        });
+        topic.case(
+            format!("usable_after_{name}"),
+            "after an error an action is usable, and no frame is open",
+            move |rig| {
+                let scene = around([shape()]);
+                let mut action = rig.action(&How::step(0.4))?;
+                let before = rig.draw_with(&mut *action, &scene)?;
+                rig.holds("refused", wrong(&mut *action, &scene), "the wrong call is refused");
+                let after = rig.draw_with(&mut *action, &scene)?;
+                rig.same("bits", &scene, &after, &before);
+                Ok(())
+            },
+        );
     }
 }
 

@@ -100,12 +100,17 @@ fn flat(topic: &mut Topic) {
         });
     }
     for shader in ["mip", "minip", "average"] {
-        topic.needing(&[Need::Shader(shader)], format!("nothing_but_nan_in_{shader}"), "without a value there is nothing", move |rig| {
-            let nothing = volume([2, 5, 2], ScalarType::F32, |_| f64::NAN);
-            let shape = shaded(shader, &VolumeTexture::new(&nothing), LookupTable::grey([0.0, 100.0]), 1.0);
-            let scene = Scene::new([shape], along_y(0.5, 0.5));
-            rig.pixel("nothing", &scene, &How::step(0.25), [0.0; 4]).map(|_| ())
-        });
+        topic.needing(
+            &[Need::Shader(shader)],
+            format!("nothing_but_nan_in_{shader}"),
+            "without a value there is nothing",
+            move |rig| {
+                let nothing = volume([2, 5, 2], ScalarType::F32, |_| f64::NAN);
+                let shape = shaded(shader, &VolumeTexture::new(&nothing), LookupTable::grey([0.0, 100.0]), 1.0);
+                let scene = Scene::new([shape], along_y(0.5, 0.5));
+                rig.pixel("nothing", &scene, &How::step(0.25), [0.0; 4]).map(|_| ())
+            },
+        );
     }
 }
 

@@ -51,7 +51,8 @@ fn slabs(topic: &mut Topic) {
                 // A segment that the shape cuts takes the power L/h of what a whole one lets through, which
                 // is known to u: off by u·(L/h)·(1 − a)^((L − h)/unit).
                 let (length, whole) = (cells as f64, absorbed(opacity, step / unit));
-                let lost = if step > length { F32 * (length / step) * (1.0 - whole).powf(length / step - 1.0) } else { 0.0 };
+                let lost =
+                    if step > length { F32 * (length / step) * (1.0 - whole).powf(length / step - 1.0) } else { 0.0 };
                 rig.allow("a cut segment as a power of a whole one", lost);
                 rig.pixel(&format!("step {step}"), &scene, &How::step(step), wanted)?;
             }

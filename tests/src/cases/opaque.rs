@@ -33,7 +33,11 @@ fn painted(points: Vec<DVec3>, triangles: Vec<u32>, color: [f64; 3]) -> Shape {
 
 fn wall(y: f64, color: [f64; 3]) -> Shape {
     let corner = |x: f64, z: f64| DVec3::new(x, y, z);
-    painted(vec![corner(-9.0, -9.0), corner(20.0, -9.0), corner(-9.0, 20.0), corner(20.0, 20.0)], vec![0, 1, 2, 1, 3, 2], color)
+    painted(
+        vec![corner(-9.0, -9.0), corner(20.0, -9.0), corner(-9.0, 20.0), corner(20.0, 20.0)],
+        vec![0, 1, 2, 1, 3, 2],
+        color,
+    )
 }
 
 fn medium() -> Shape {
@@ -61,21 +65,30 @@ fn walls(topic: &mut Topic) {
         rig.pixel("colour", &scene, &How::step(0.25), [alpha, 1.0, alpha, 1.0]).map(|_| ())
     });
     for shader in ["mip", "average"] {
-        topic.needing(&[Need::Shader("surface"), Need::Shader(shader)], format!("wall_in_{shader}"), "pictures of values end at the wall", move |rig| {
-            let data = crate::scene::volume([2, 5, 2], volact_core::ScalarType::F32, |p| 10.0 * p.y);
-            let table = greys(&[(0.0, 0.0, 1.0), (100.0, 1.0, 1.0)]);
-            let shape = shaded(shader, &volact_core::VolumeTexture::new(&data), table, 1.0);
-            let scene = Scene::new([wall(2.0, [1.0, 0.0, 0.0]), shape], along_y(0.5, 0.5));
-            let wanted = if shader == "mip" { 0.2 } else { 0.1 };
-            rig.allow("half a step of a slope of 0.1", if shader == "mip" { 0.1 / 128.0 } else { 0.0 });
-            rig.pixel("value", &scene, &How::step(1.0 / 64.0), [wanted, wanted, wanted, 1.0]).map(|_| ())
-        });
+        topic.needing(
+            &[Need::Shader("surface"), Need::Shader(shader)],
+            format!("wall_in_{shader}"),
+            "pictures of values end at the wall",
+            move |rig| {
+                let data = crate::scene::volume([2, 5, 2], volact_core::ScalarType::F32, |p| 10.0 * p.y);
+                let table = greys(&[(0.0, 0.0, 1.0), (100.0, 1.0, 1.0)]);
+                let shape = shaded(shader, &volact_core::VolumeTexture::new(&data), table, 1.0);
+                let scene = Scene::new([wall(2.0, [1.0, 0.0, 0.0]), shape], along_y(0.5, 0.5));
+                let wanted = if shader == "mip" { 0.2 } else { 0.1 };
+                rig.allow("half a step of a slope of 0.1", if shader == "mip" { 0.1 / 128.0 } else { 0.0 });
+                rig.pixel("value", &scene, &How::step(1.0 / 64.0), [wanted, wanted, wanted, 1.0]).map(|_| ())
+            },
+        );
     }
 }
 
 fn lit(topic: &mut Topic) {
     let slope = || {
-        painted(vec![DVec3::new(-9.0, -9.0, -9.0), DVec3::new(9.0, 9.0, -9.0), DVec3::new(0.0, 0.0, 9.0)], vec![0, 1, 2], [1.0, 0.5, 0.0])
+        painted(
+            vec![DVec3::new(-9.0, -9.0, -9.0), DVec3::new(9.0, 9.0, -9.0), DVec3::new(0.0, 0.0, 9.0)],
+            vec![0, 1, 2],
+            [1.0, 0.5, 0.0],
+        )
     };
     for (name, light, ambient) in [
         ("from_the_eye", None, 0.2),
@@ -98,12 +111,17 @@ fn lit(topic: &mut Topic) {
             rig.pixel("shade", &scene, &How::step(0.25), [shade, 0.5 * shade, 0.0, 1.0]).map(|_| ())
         });
     }
-    topic.needing(SURFACE, "lit_under_a_transform", "normals go to the world through the inverse transpose", move |rig| {
-        let shape = slope();
-        shape.set_parameter("lightdir", DVec3::new(0.4, -0.7, 0.3));
-        shape.set_transform(DAffine3::from_rotation_z(0.3) * DAffine3::from_scale(DVec3::new(0.4, 1.7, 0.9)));
-        rig.lattice("picture", &around([shape]), &How::default()).map(|_| ())
-    });
+    topic.needing(
+        SURFACE,
+        "lit_under_a_transform",
+        "normals go to the world through the inverse transpose",
+        move |rig| {
+            let shape = slope();
+            shape.set_parameter("lightdir", DVec3::new(0.4, -0.7, 0.3));
+            shape.set_transform(DAffine3::from_rotation_z(0.3) * DAffine3::from_scale(DVec3::new(0.4, 1.7, 0.9)));
+            rig.lattice("picture", &around([shape]), &How::default()).map(|_| ())
+        },
+    );
 }
 
 /// A folded sheet through the volume.
@@ -147,14 +165,18 @@ fn handed(topic: &mut Topic) {
     let view = rh::view::look_at_mat4(eye, DVec3::new(3.0, 2.5, 3.5), DVec3::Z);
     for with_color in [true, false] {
         let name = if with_color { "distances_with_colour" } else { "distances_without_colour" };
-        topic.case(name, "every ray ends at the depth, and the colour lies there; without colour it ends in nothing", move |rig| {
-            let mut scene = through([shape()]);
-            scene.desc.camera = Camera::perspective(eye, DVec3::new(3.0, 2.5, 3.5), DVec3::Z, 36.0);
-            let depth = OpaqueDepth::Distance((0..n).map(|i| distance(i) as f32).collect());
-            let color = with_color.then(|| (0..n).map(color).collect());
-            scene.desc.opaque = Some(Opaque { color, depth });
-            rig.lattice("picture", &scene, &How::step(0.3)).map(|_| ())
-        });
+        topic.case(
+            name,
+            "every ray ends at the depth, and the colour lies there; without colour it ends in nothing",
+            move |rig| {
+                let mut scene = through([shape()]);
+                scene.desc.camera = Camera::perspective(eye, DVec3::new(3.0, 2.5, 3.5), DVec3::Z, 36.0);
+                let depth = OpaqueDepth::Distance((0..n).map(|i| distance(i) as f32).collect());
+                let color = with_color.then(|| (0..n).map(color).collect());
+                scene.desc.opaque = Some(Opaque { color, depth });
+                rig.lattice("picture", &scene, &How::step(0.3)).map(|_| ())
+            },
+        );
     }
     let gl = rh::proj::opengl::perspective(0.62, 1.0, 2.0, 60.0);
     let dx = rh::proj::directx::perspective(0.62, 1.0, 2.0, 60.0);

@@ -41,7 +41,8 @@ fn slab((color, opacity): Share, cells: usize) -> Shape {
 }
 
 fn closed(topic: &mut Topic) {
-    for (name, shares) in [("two", vec![RED, GREEN]), ("three", vec![RED, GREEN, BLUE]), ("twins", vec![GREEN, GREEN])] {
+    for (name, shares) in [("two", vec![RED, GREEN]), ("three", vec![RED, GREEN, BLUE]), ("twins", vec![GREEN, GREEN])]
+    {
         topic.case(format!("{name}_coincide"), "extinctions add and mix the colours", move |rig| {
             let scene = Scene::new(shares.iter().map(|s| slab(*s, 2)), along_y(0.7, 0.7));
             rig.pixel("mixed", &scene, &How::step(0.25), mixed(&shares, 2.0)).map(|_| ())
@@ -70,15 +71,20 @@ fn closed(topic: &mut Topic) {
         let (a, b) = (rig.draw(&three, &How::step(0.4))?, rig.draw(&one, &How::step(0.4))?);
         rig.alike("variant", &three, &a, &b)
     });
-    topic.needing(&[Need::Shader("attribute")], "volume_in_a_mesh", "a mesh's numbers and a volume in one place", |rig| {
-        // The corner is 3 long along y at (0.5, 0.5), the block lies at y = 1 to 2 in it.
-        let corner = field(corner(4.0), |_| 0.0, colors(&[(0.0, RED.0, RED.1)]), 1.0);
-        let block = slab(GREEN, 1);
-        block.set_transform(DAffine3::from_translation(DVec3::Y));
-        let ends = mixed(&[RED], 1.0);
-        let wanted = super::stock::over(super::stock::over(ends, mixed(&[RED, GREEN], 1.0)), ends);
-        rig.pixel("mixed", &Scene::new([corner, block], along_y(0.5, 0.5)), &How::step(0.25), wanted).map(|_| ())
-    });
+    topic.needing(
+        &[Need::Shader("attribute")],
+        "volume_in_a_mesh",
+        "a mesh's numbers and a volume in one place",
+        |rig| {
+            // The corner is 3 long along y at (0.5, 0.5), the block lies at y = 1 to 2 in it.
+            let corner = field(corner(4.0), |_| 0.0, colors(&[(0.0, RED.0, RED.1)]), 1.0);
+            let block = slab(GREEN, 1);
+            block.set_transform(DAffine3::from_translation(DVec3::Y));
+            let ends = mixed(&[RED], 1.0);
+            let wanted = super::stock::over(super::stock::over(ends, mixed(&[RED, GREEN], 1.0)), ends);
+            rig.pixel("mixed", &Scene::new([corner, block], along_y(0.5, 0.5)), &How::step(0.25), wanted).map(|_| ())
+        },
+    );
 }
 
 fn turned() -> Shape {
@@ -98,17 +104,25 @@ fn pictures(topic: &mut Topic) {
     }
     topic.case("volume_in_a_ball", "a volume in a mesh through another in a block", |rig| {
         let ball = Sphere::new(DVec3::splat(3.5), 2.6, 12).expect("a ball");
-        let inner = Shape::new(ball, look("lut", greys(&[(0.0, 1.0, 0.0), (90.0, 0.5, 0.3)]), 1.0).with("volume", VolumeTexture::new(&usual())));
+        let inner = Shape::new(
+            ball,
+            look("lut", greys(&[(0.0, 1.0, 0.0), (90.0, 0.5, 0.3)]), 1.0).with("volume", VolumeTexture::new(&usual())),
+        );
         rig.lattice("picture", &around([turned(), inner]), &How::step(0.3)).map(|_| ())
     });
     topic.needing(&[Need::Shader("gradient")], "lit_and_plain", "a lit shape through a plain one", |rig| {
         let lit = shaded("gradient", &VolumeTexture::new(&usual()), warm(), 1.0);
         rig.lattice("picture", &around([lit, turned()]), &How::step(0.3)).map(|_| ())
     });
-    topic.needing(&[Need::Shader("attribute")], "numbers_of_a_mesh_through_a_volume", "numbers of a mesh converge with the step", |rig| {
-        let mesh = field(bent([3, 2, 3], DVec3::splat(5.0), 0.1), rule, warm(), 1.0);
-        rig.slope("order", &around([mesh, turned()]), &How::default(), &[0.4, 0.2, 0.1, 0.05], [1.5, 2.6])
-    });
+    topic.needing(
+        &[Need::Shader("attribute")],
+        "numbers_of_a_mesh_through_a_volume",
+        "numbers of a mesh converge with the step",
+        |rig| {
+            let mesh = field(bent([3, 2, 3], DVec3::splat(5.0), 0.1), rule, warm(), 1.0);
+            rig.slope("order", &around([mesh, turned()]), &How::default(), &[0.4, 0.2, 0.1, 0.05], [1.5, 2.6])
+        },
+    );
 }
 
 fn orders(topic: &mut Topic) {
@@ -124,34 +138,43 @@ fn orders(topic: &mut Topic) {
         }
         Ok(())
     });
-    topic.case("shapes_apart_in_any_order", "shapes apart are composited by depth, not by the order of drawing", |rig| {
-        let behind = shape();
-        behind.set_transform(DAffine3::from_translation(DVec3::new(1.0, 9.0, 0.5)));
-        let scene = around([behind, shape()]);
-        let a = rig.lattice("as drawn", &scene, &How::step(0.4))?;
-        let b = rig.draw(&scene.reversed(), &How::step(0.4))?;
-        rig.same("reversed", &scene, &b, &a);
-        Ok(())
-    });
+    topic.case(
+        "shapes_apart_in_any_order",
+        "shapes apart are composited by depth, not by the order of drawing",
+        |rig| {
+            let behind = shape();
+            behind.set_transform(DAffine3::from_translation(DVec3::new(1.0, 9.0, 0.5)));
+            let scene = around([behind, shape()]);
+            let a = rig.lattice("as drawn", &scene, &How::step(0.4))?;
+            let b = rig.draw(&scene.reversed(), &How::step(0.4))?;
+            rig.same("reversed", &scene, &b, &a);
+            Ok(())
+        },
+    );
 }
 
 /// Shapes that are one picture each lie over the rest in the order of `draw`.
 fn flat(topic: &mut Topic) {
-    topic.needing(&[Need::Shader("mip"), Need::Shader("average")], "pictures_in_the_order_of_drawing", "laid over in the order of drawing", |rig| {
-        let data = VolumeTexture::new(&constant(1.0, [1, 1, 1]));
-        let red = shaded("mip", &data, colors(&[(0.0, [1.0, 0.0, 0.0], 0.5)]), 1.0);
-        let green = shaded("average", &data, colors(&[(0.0, [0.0, 1.0, 0.0], 0.25)]), 1.0);
-        green.set_transform(DAffine3::from_translation(DVec3::Y * 7.0));
-        let blue = lut(data.volume(), colors(&[(0.0, [0.0, 0.0, 1.0], 0.5)]), 1.0);
-        let over = super::stock::over;
-        let (r, g, b) = ([0.5, 0.0, 0.0, 0.5], [0.0, 0.25, 0.0, 0.25], [0.0, 0.0, 0.5, 0.5]);
-        for (label, shapes, wanted) in [
-            ("red, then green", [&blue, &red, &green], over(g, over(r, b))),
-            ("green, then red", [&green, &blue, &red], over(r, over(g, b))),
-        ] {
-            let scene = Scene::new(shapes.map(Clone::clone), along_y(0.5, 0.5));
-            rig.pixel(label, &scene, &How::step(0.3), wanted)?;
-        }
-        Ok(())
-    });
+    topic.needing(
+        &[Need::Shader("mip"), Need::Shader("average")],
+        "pictures_in_the_order_of_drawing",
+        "laid over in the order of drawing",
+        |rig| {
+            let data = VolumeTexture::new(&constant(1.0, [1, 1, 1]));
+            let red = shaded("mip", &data, colors(&[(0.0, [1.0, 0.0, 0.0], 0.5)]), 1.0);
+            let green = shaded("average", &data, colors(&[(0.0, [0.0, 1.0, 0.0], 0.25)]), 1.0);
+            green.set_transform(DAffine3::from_translation(DVec3::Y * 7.0));
+            let blue = lut(data.volume(), colors(&[(0.0, [0.0, 0.0, 1.0], 0.5)]), 1.0);
+            let over = super::stock::over;
+            let (r, g, b) = ([0.5, 0.0, 0.0, 0.5], [0.0, 0.25, 0.0, 0.25], [0.0, 0.0, 0.5, 0.5]);
+            for (label, shapes, wanted) in [
+                ("red, then green", [&blue, &red, &green], over(g, over(r, b))),
+                ("green, then red", [&green, &blue, &red], over(r, over(g, b))),
+            ] {
+                let scene = Scene::new(shapes.map(Clone::clone), along_y(0.5, 0.5));
+                rig.pixel(label, &scene, &How::step(0.3), wanted)?;
+            }
+            Ok(())
+        },
+    );
 }

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use volact_core::{
-    Appearance, Compositing, Declaration, LookupTable, ParameterDecl, ParameterType, ScalarType, Shape, ShaderEntry,
-    ShaderText, Volume, VolumeTexture,
+    Appearance, Compositing, Declaration, LookupTable, ParameterDecl, ParameterType, ScalarType, ShaderEntry,
+    ShaderText, Shape, Volume, VolumeTexture,
     glam::{DAffine3, DVec3},
     parameter::Kind,
 };
@@ -59,14 +59,19 @@ fn flat(topic: &mut Topic) {
             rig.lattice("picture", &through([shape]), &How::step(0.3)).map(|_| ())
         });
     }
-    topic.needing(&[Need::Shader("mip")], "mip_of_negative_values", "the highest of negative values is negative", |rig| {
-        let data = volume([2, 3, 2], ScalarType::F32, |p| -30.0 - 10.0 * (p.y - 1.0).abs());
-        let table = colors(&[(-40.0, [1.0, 0.0, 0.0], 1.0), (0.0, [0.0, 1.0, 0.0], 1.0)]);
-        rig.allow("half a step of a slope of 0.25", 0.25 / 128.0);
-        let shape = Shape::around(&data, look("mip", table, 1.0));
-        let scene = Scene::new([shape], along_y(0.5, 0.5));
-        rig.pixel("value", &scene, &How::step(1.0 / 64.0), [0.75, 0.25, 0.0, 1.0]).map(|_| ())
-    });
+    topic.needing(
+        &[Need::Shader("mip")],
+        "mip_of_negative_values",
+        "the highest of negative values is negative",
+        |rig| {
+            let data = volume([2, 3, 2], ScalarType::F32, |p| -30.0 - 10.0 * (p.y - 1.0).abs());
+            let table = colors(&[(-40.0, [1.0, 0.0, 0.0], 1.0), (0.0, [0.0, 1.0, 0.0], 1.0)]);
+            rig.allow("half a step of a slope of 0.25", 0.25 / 128.0);
+            let shape = Shape::around(&data, look("mip", table, 1.0));
+            let scene = Scene::new([shape], along_y(0.5, 0.5));
+            rig.pixel("value", &scene, &How::step(1.0 / 64.0), [0.75, 0.25, 0.0, 1.0]).map(|_| ())
+        },
+    );
     for shader in ["mip", "average"] {
         let about = "opacity is taken as it stands: no length in it";
         topic.needing(&[Need::Shader(shader)], format!("{shader}_has_no_length"), about, move |rig| {
@@ -79,10 +84,15 @@ fn flat(topic: &mut Topic) {
             Ok(())
         });
     }
-    topic.needing(&[Need::Shader("simple")], "simple_picture", "the volume's own components as colour and opacity", |rig| {
-        let shape = Shape::around(&usual(), Appearance::new("simple").with("unit_distance", 2.0));
-        rig.lattice("picture", &around([shape]), &How::step(0.3)).map(|_| ())
-    });
+    topic.needing(
+        &[Need::Shader("simple")],
+        "simple_picture",
+        "the volume's own components as colour and opacity",
+        |rig| {
+            let shape = Shape::around(&usual(), Appearance::new("simple").with("unit_distance", 2.0));
+            rig.lattice("picture", &around([shape]), &How::step(0.3)).map(|_| ())
+        },
+    );
 }
 
 /// Every light and model of the lit shaders.
@@ -98,12 +108,18 @@ fn lights(topic: &mut Topic) {
                 });
             }
         }
-        topic.needing(&[Need::Shader(shader)], format!("{shader}_by_default"), "as declared: a head light", move |rig| {
-            let table = if shader == "gradient" { "lookup_table" } else { "surfaces" };
-            let shape = Shape::around(&usual(), Appearance::new(shader).with(table, warm()).with("unit_distance", 1.0));
-            edges(rig, shader);
-            rig.lattice("picture", &through([shape]), &How::step(0.3)).map(|_| ())
-        });
+        topic.needing(
+            &[Need::Shader(shader)],
+            format!("{shader}_by_default"),
+            "as declared: a head light",
+            move |rig| {
+                let table = if shader == "gradient" { "lookup_table" } else { "surfaces" };
+                let shape =
+                    Shape::around(&usual(), Appearance::new(shader).with(table, warm()).with("unit_distance", 1.0));
+                edges(rig, shader);
+                rig.lattice("picture", &through([shape]), &How::step(0.3)).map(|_| ())
+            },
+        );
     }
     for (name, direction, offset) in [("x", DVec3::X, 1.0), ("oblique", DVec3::new(0.4, -0.7, 0.6), 0.5)] {
         let about = "lit without gradients by the difference of two samples along the light";
@@ -112,12 +128,17 @@ fn lights(topic: &mut Topic) {
             rig.lattice("picture", &around([Shape::around(&usual(), look)]), &How::step(0.3)).map(|_| ())
         });
     }
-    topic.needing(&[Need::Shader("gradient")], "flat_field_has_ambient_light_only", "without a gradient: ambient", |rig| {
-        let look = look("gradient", colors(&[(1.0, [0.8, 0.5, 0.3], 0.5)]), 1.0).with("ambient", 0.3);
-        let scene = Scene::new([Shape::around(&constant(1.0, [2, 2, 2]), look)], along_y(0.9, 1.1));
-        let wanted = laid([0.24, 0.15, 0.09], absorbed(0.5, 2.0));
-        rig.pixel("colour", &scene, &How::step(0.25), wanted).map(|_| ())
-    });
+    topic.needing(
+        &[Need::Shader("gradient")],
+        "flat_field_has_ambient_light_only",
+        "without a gradient: ambient",
+        |rig| {
+            let look = look("gradient", colors(&[(1.0, [0.8, 0.5, 0.3], 0.5)]), 1.0).with("ambient", 0.3);
+            let scene = Scene::new([Shape::around(&constant(1.0, [2, 2, 2]), look)], along_y(0.9, 1.1));
+            let wanted = laid([0.24, 0.15, 0.09], absorbed(0.5, 2.0));
+            rig.pixel("colour", &scene, &How::step(0.25), wanted).map(|_| ())
+        },
+    );
 }
 
 fn lit(shader: &str, model: &str, light: &str) -> Appearance {
@@ -138,29 +159,36 @@ fn lit(shader: &str, model: &str, light: &str) -> Appearance {
 /// Crossings are searched for between samples, to a stated part of the step.
 fn edges(rig: &mut Rig<'_>, shader: &str) {
     if shader == "isosurface" {
-        rig.because("a ray that grazes a surface meets it or not by rounding, and the tolerance there is the change itself");
+        rig.because(
+            "a ray that grazes a surface meets it or not by rounding, and the tolerance there is the change itself",
+        );
     }
 }
 
 /// Surfaces of a linear field are planes at known depths.
 fn surfaces(topic: &mut Topic) {
     let needs = [Need::Shader("isosurface")];
-    topic.needing(&needs, "isosurfaces_of_a_ramp", "crossings in depth order, each a lit surface of its own opacity", |rig| {
-        let data = volume([5, 9, 5], ScalarType::F32, |p| p.y);
-        let levels = colors(&[(2.5, [1.0, 0.5, 0.0], 0.4), (5.25, [0.0, 0.5, 1.0], 1.0), (6.0, [1.0; 3], 1.0)]);
-        let look = Appearance::new("isosurface").with("volume", VolumeTexture::new(&data)).with("surfaces", levels);
-        let look = look.with("ambient", 0.25).with("diffuse", 0.5).with("specular", 0.125).with("shininess", 3.0);
-        let shape = Shape::around(&data, look);
-        // Head on: n·l and n·h are 1.
-        let lit = |c: f64| c * 0.75 + 0.125;
-        let [a, b] = [[1.0, 0.5, 0.0], [0.0, 0.5, 1.0]].map(|c: [f64; 3]| c.map(lit));
-        let wanted: [f64; 4] = std::array::from_fn(|c| if c == 3 { 1.0 } else { 0.4 * a[c] + 0.6 * b[c] });
-        for step in [0.3, 1.0] {
-            let scene = Scene::new([shape.clone()], along_y(2.0, 2.0));
-            rig.pixel(&format!("step {step}"), &scene, &How::step(step), wanted)?;
-        }
-        Ok(())
-    });
+    topic.needing(
+        &needs,
+        "isosurfaces_of_a_ramp",
+        "crossings in depth order, each a lit surface of its own opacity",
+        |rig| {
+            let data = volume([5, 9, 5], ScalarType::F32, |p| p.y);
+            let levels = colors(&[(2.5, [1.0, 0.5, 0.0], 0.4), (5.25, [0.0, 0.5, 1.0], 1.0), (6.0, [1.0; 3], 1.0)]);
+            let look = Appearance::new("isosurface").with("volume", VolumeTexture::new(&data)).with("surfaces", levels);
+            let look = look.with("ambient", 0.25).with("diffuse", 0.5).with("specular", 0.125).with("shininess", 3.0);
+            let shape = Shape::around(&data, look);
+            // Head on: n·l and n·h are 1.
+            let lit = |c: f64| c * 0.75 + 0.125;
+            let [a, b] = [[1.0, 0.5, 0.0], [0.0, 0.5, 1.0]].map(|c: [f64; 3]| c.map(lit));
+            let wanted: [f64; 4] = std::array::from_fn(|c| if c == 3 { 1.0 } else { 0.4 * a[c] + 0.6 * b[c] });
+            for step in [0.3, 1.0] {
+                let scene = Scene::new([shape.clone()], along_y(2.0, 2.0));
+                rig.pixel(&format!("step {step}"), &scene, &How::step(step), wanted)?;
+            }
+            Ok(())
+        },
+    );
     topic.needing(&needs, "isosurface_in_a_medium", "surfaces are merged in depth with what is over", |rig| {
         let data = volume([3, 5, 3], ScalarType::F32, |p| p.y);
         let levels = colors(&[(2.0, [1.0, 0.0, 0.0], 0.5)]);
@@ -176,14 +204,24 @@ fn surfaces(topic: &mut Topic) {
 }
 
 fn several(topic: &mut Topic) {
-    topic.needing(&[Need::Shader("lut2d")], "lut2d_picture", "a table of the value times one of the gradient's magnitude", |rig| {
-        let magnitude = colors(&[(0.0, [1.0; 3], 0.2), (15.0, [0.5, 1.0, 0.7], 1.0), (40.0, [1.0, 0.4, 0.2], 0.6)]);
-        let look = look("lut2d", warm(), 1.0).with("gradient_table", magnitude);
-        rig.lattice("picture", &around([Shape::around(&usual(), look)]), &How::step(0.3)).map(|_| ())
-    });
+    topic.needing(
+        &[Need::Shader("lut2d")],
+        "lut2d_picture",
+        "a table of the value times one of the gradient's magnitude",
+        |rig| {
+            let magnitude = colors(&[(0.0, [1.0; 3], 0.2), (15.0, [0.5, 1.0, 0.7], 1.0), (40.0, [1.0, 0.4, 0.2], 0.6)]);
+            let look = look("lut2d", warm(), 1.0).with("gradient_table", magnitude);
+            rig.lattice("picture", &around([Shape::around(&usual(), look)]), &How::step(0.3)).map(|_| ())
+        },
+    );
     let blocks = || volume([7, 6, 8], ScalarType::U8, |p| ((p.x / 3.0).floor() + 2.0 * (p.z / 4.0).floor()).min(3.0));
     let by_label = || {
-        colors(&[(0.0, [0.0; 3], 0.0), (1.0, [1.0, 0.1, 0.1], 0.3), (2.0, [0.1, 1.0, 0.1], 0.5), (3.0, [0.2, 0.3, 1.0], 0.2)])
+        colors(&[
+            (0.0, [0.0; 3], 0.0),
+            (1.0, [1.0, 0.1, 0.1], 0.3),
+            (2.0, [0.1, 1.0, 0.1], 0.5),
+            (3.0, [0.2, 0.3, 1.0], 0.2),
+        ])
     };
     for with_values in [false, true] {
         let name = if with_values { "labels_with_values" } else { "labels_alone" };
@@ -216,7 +254,8 @@ fn several(topic: &mut Topic) {
         });
     }
     topic.needing(&[Need::Shader("attribute")], "attribute_picture", "per-vertex numbers through a table", |rig| {
-        let shape = crate::meshes::field(crate::meshes::bent([3, 4, 2], DVec3::new(6.0, 5.0, 7.0), 0.1), rule, warm(), 1.0);
+        let shape =
+            crate::meshes::field(crate::meshes::bent([3, 4, 2], DVec3::new(6.0, 5.0, 7.0), 0.1), rule, warm(), 1.0);
         rig.lattice("picture", &around([shape]), &How::default()).map(|_| ())
     });
 }

@@ -67,21 +67,28 @@ fn closed(topic: &mut Topic) {
         ("opacity_is_not_looked_at", SliceStyle::Opaque, laid(GREY, 1.0)),
         ("opacity_as_it_stands", SliceStyle::Blended, laid(GREY, 0.3)),
     ] {
-        topic.case(name, "an opaque plane has the table's colour, a blended one its opacity as it stands", move |rig| {
-            let look = look("lut", colors(&[(1.0, GREY, 0.3)]), 7.0).with("volume", VolumeTexture::new(&constant(1.0, [6, 5, 7])));
-            let shape = sliced(vec![plane(CENTER, DVec3::Y)], style, false, look);
-            rig.pixel("plane", &Scene::new([shape], along_y(2.2, 3.3)), &How::step(0.25), wanted).map(|_| ())
-        });
+        topic.case(
+            name,
+            "an opaque plane has the table's colour, a blended one its opacity as it stands",
+            move |rig| {
+                let look = look("lut", colors(&[(1.0, GREY, 0.3)]), 7.0)
+                    .with("volume", VolumeTexture::new(&constant(1.0, [6, 5, 7])));
+                let shape = sliced(vec![plane(CENTER, DVec3::Y)], style, false, look);
+                rig.pixel("plane", &Scene::new([shape], along_y(2.2, 3.3)), &How::step(0.25), wanted).map(|_| ())
+            },
+        );
     }
     topic.case("plane_in_a_medium", "the medium before the plane, the plane, the medium behind", |rig| {
-        let look = look("lut", colors(&[(1.0, GREY, 0.3)]), 1.0).with("volume", VolumeTexture::new(&constant(1.0, [6, 5, 7])));
+        let look =
+            look("lut", colors(&[(1.0, GREY, 0.3)]), 1.0).with("volume", VolumeTexture::new(&constant(1.0, [6, 5, 7])));
         let shape = sliced(vec![plane(CENTER, DVec3::Y)], SliceStyle::Blended, true, look);
         let part = |length| laid(GREY, absorbed(0.3, length));
         let wanted = over(over(part(2.3), laid(GREY, 0.3)), part(2.7));
         rig.pixel("colour", &Scene::new([shape], along_y(2.2, 3.3)), &How::step(0.25), wanted).map(|_| ())
     });
     topic.case("ray_in_the_plane_does_not_meet_it", "a ray in a plane does not meet it", |rig| {
-        let look = look("lut", colors(&[(1.0, GREY, 0.3)]), 1.0).with("volume", VolumeTexture::new(&constant(1.0, [6, 5, 7])));
+        let look =
+            look("lut", colors(&[(1.0, GREY, 0.3)]), 1.0).with("volume", VolumeTexture::new(&constant(1.0, [6, 5, 7])));
         let shape = sliced(vec![plane(DVec3::X * 2.0, DVec3::X)], SliceStyle::Opaque, false, look);
         rig.pixel("nothing", &Scene::new([shape], along_y(2.0, 3.3)), &How::step(0.25), [0.0; 4]).map(|_| ())
     });
@@ -116,15 +123,18 @@ fn several(topic: &mut Topic) {
     });
     topic.case("without_a_number", "where a sample is NaN a plane is transparent, also an opaque one", |rig| {
         let odd = |p: DVec3| if p.distance(DVec3::splat(3.0)) < 1.1 { f64::NAN } else { rule(p) };
-        let look = look("lut", warm(), 1.0).with("volume", VolumeTexture::new(&volume([7, 6, 8], ScalarType::F32, odd)));
+        let look =
+            look("lut", warm(), 1.0).with("volume", VolumeTexture::new(&volume([7, 6, 8], ScalarType::F32, odd)));
         let shape = sliced(vec![plane(CENTER, DVec3::new(0.2, 1.0, 0.1))], SliceStyle::Opaque, false, look);
         rig.lattice("picture", &around([shape]), &How::step(0.3)).map(|_| ())
     });
     topic.needing(&[Need::Shader("attribute")], "through_a_mesh", "planes through the numbers of a mesh", |rig| {
         let mesh = bent([3, 4, 2], DVec3::new(6.0, 5.0, 7.0), 0.1);
         let scalars = scalars_of(&mesh, rule);
-        let slices = Slices { planes: vec![plane(CENTER, DVec3::new(0.2, 1.0, 0.1))], style: SliceStyle::Opaque, volume: false };
+        let slices =
+            Slices { planes: vec![plane(CENTER, DVec3::new(0.2, 1.0, 0.1))], style: SliceStyle::Opaque, volume: false };
         let sliced = Sliced::new(Arc::new(mesh), slices).expect("planes");
-        rig.lattice("picture", &around([Shape::new(sliced, attribute(scalars, warm(), 1.0))]), &How::default()).map(|_| ())
+        rig.lattice("picture", &around([Shape::new(sliced, attribute(scalars, warm(), 1.0))]), &How::default())
+            .map(|_| ())
     });
 }

@@ -34,13 +34,17 @@ fn sizes(topic: &mut Topic) {
         rig.holds("background", frame.background == scene.desc.background, "the background asked for");
         Ok(())
     });
-    topic.case("numbers_are_sound", "no channel is negative or not finite, no opacity above 1, no depth negative", |rig| {
-        let frame = rig.draw(&through([shape()]), &How::step(0.3))?;
-        let sound = |c: &[f32; 4]| c.iter().all(|v| v.is_finite() && *v >= 0.0) && c[3] <= 1.0;
-        rig.holds("colours", frame.color.iter().all(sound), "finite and from 0");
-        rig.holds("depths", frame.depth.iter().all(|d| *d >= 0.0), "no negative or NaN depth");
-        Ok(())
-    });
+    topic.case(
+        "numbers_are_sound",
+        "no channel is negative or not finite, no opacity above 1, no depth negative",
+        |rig| {
+            let frame = rig.draw(&through([shape()]), &How::step(0.3))?;
+            let sound = |c: &[f32; 4]| c.iter().all(|v| v.is_finite() && *v >= 0.0) && c[3] <= 1.0;
+            rig.holds("colours", frame.color.iter().all(sound), "finite and from 0");
+            rig.holds("depths", frame.depth.iter().all(|d| *d >= 0.0), "no negative or NaN depth");
+            Ok(())
+        },
+    );
 }
 
 fn methods(topic: &mut Topic) {
@@ -48,27 +52,37 @@ fn methods(topic: &mut Topic) {
         let frame = rig.draw(&around([shape()]), &How::step(0.3))?;
         let lattice = Lattice::of(&frame.method);
         let m = &frame.method;
-        let repeatable = lattice.is_ok() || ["axis-aligned", "object", "primitive"].iter().any(|w| m.sampling.contains(w));
+        let repeatable =
+            lattice.is_ok() || ["axis-aligned", "object", "primitive"].iter().any(|w| m.sampling.contains(w));
         rig.holds("lattice", repeatable, &format!("{lattice:?} of {:?}", m.sampling));
-        for (what, text) in
-            [("classification", &m.classification), ("format", &m.texture_format), ("filter", &m.filter), ("blend", &m.blend), ("device", &m.device)]
-        {
+        for (what, text) in [
+            ("classification", &m.classification),
+            ("format", &m.texture_format),
+            ("filter", &m.filter),
+            ("blend", &m.blend),
+            ("device", &m.device),
+        ] {
             rig.holds(what, !text.is_empty(), &format!("{what} is {text:?}"));
         }
         let precision = Precision::of(m);
         rig.holds("termination", (0.0..=1.0).contains(&precision.termination), &format!("{}", precision.termination));
         Ok(())
     });
-    topic.needing(&[Need::Option("sample_distance")], "step_is_reported", "the step asked for is the step reported", |rig| {
-        if rig.subject().options.contains_key("sample_distance") {
-            return Err(Stop::Skip("set by the user".into()));
-        }
-        for step in [0.2, 0.7] {
-            let found = rig.draw(&around([shape()]), &How::step(step))?.method.sample_distance;
-            rig.holds(&format!("{step}"), found == step || found == 0.0, &format!("{found}, asked for {step}"));
-        }
-        Ok(())
-    });
+    topic.needing(
+        &[Need::Option("sample_distance")],
+        "step_is_reported",
+        "the step asked for is the step reported",
+        |rig| {
+            if rig.subject().options.contains_key("sample_distance") {
+                return Err(Stop::Skip("set by the user".into()));
+            }
+            for step in [0.2, 0.7] {
+                let found = rig.draw(&around([shape()]), &How::step(step))?.method.sample_distance;
+                rig.holds(&format!("{step}"), found == step || found == 0.0, &format!("{found}, asked for {step}"));
+            }
+            Ok(())
+        },
+    );
     topic.case("device_is_that_of_the_action", "the frame names the device that the action does", |rig| {
         let frame = rig.draw(&around([shape()]), &How::step(0.3))?;
         let caps = rig.action(&How::default())?.caps().device;
@@ -110,7 +124,11 @@ fn costs(topic: &mut Topic) {
     topic.case("times_add_up", "total is at least what prepared and what drew", |rig| {
         let s = rig.draw(&around([shape()]), &How::step(0.3))?.statistics;
         rig.holds("some", s.total > Duration::ZERO, &format!("{:?}", s.total));
-        rig.holds("sum", s.prepare + s.render <= s.total + Duration::from_micros(1), &format!("{:?} + {:?} of {:?}", s.prepare, s.render, s.total));
+        rig.holds(
+            "sum",
+            s.prepare + s.render <= s.total + Duration::from_micros(1),
+            &format!("{:?} + {:?} of {:?}", s.prepare, s.render, s.total),
+        );
         Ok(())
     });
     topic.case("second_frame_prepares_nothing", "nothing is prepared or moved anew where nothing changed", |rig| {
@@ -133,7 +151,11 @@ fn costs(topic: &mut Topic) {
         shape.set_parameter("lookup_table", greys(&[(30.0, 0.2, 0.0), (150.0, 0.8, 0.5)]));
         let frame = rig.draw_with(&mut *action, &scene)?;
         let moved = frame.statistics.uploaded_bytes;
-        rig.holds("uploaded", moved < data.data().len() / 2, &format!("{moved} bytes moved of a volume of {}", data.data().len()));
+        rig.holds(
+            "uploaded",
+            moved < data.data().len() / 2,
+            &format!("{moved} bytes moved of a volume of {}", data.data().len()),
+        );
         Ok(())
     });
 }
@@ -157,7 +179,8 @@ fn warnings(topic: &mut Topic) {
         }
         let appearance = Appearance::new("simple").with("lookup_table", warm()).with("unit_distance", 1.0);
         let frame = rig.draw(&around([Shape::around(&usual(), appearance)]), &How::step(0.3))?;
-        let said = frame.warnings.iter().any(|w| w.code == WarningCode::UnusedParameter && w.message.contains("lookup_table"));
+        let said =
+            frame.warnings.iter().any(|w| w.code == WarningCode::UnusedParameter && w.message.contains("lookup_table"));
         rig.holds("said", said, &format!("{:?}", frame.warnings));
         Ok(())
     });

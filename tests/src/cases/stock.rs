@@ -13,7 +13,8 @@ pub const PIXELS: usize = 32;
 
 /// 0 to 100, and like itself along no axis, mirrored by none, swapped with none.
 pub fn rule(p: DVec3) -> f64 {
-    let v = 50.0 + 21.0 * (0.9 * p.x + 0.3).sin() + 16.0 * (0.7 * p.y - 0.2 * p.x).cos() + 11.0 * (1.1 * p.z + 0.4).sin();
+    let v =
+        50.0 + 21.0 * (0.9 * p.x + 0.3).sin() + 16.0 * (0.7 * p.y - 0.2 * p.x).cos() + 11.0 * (1.1 * p.z + 0.4).sin();
     v.round().clamp(0.0, 100.0)
 }
 

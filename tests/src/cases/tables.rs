@@ -72,7 +72,8 @@ fn entries(topic: &mut Topic) {
                 let t = i as f32 / (count.max(2) - 1) as f32;
                 [t, 0.5 + 0.5 * (9.0 * t).sin(), 1.0 - t, 0.6 * t * t]
             };
-            let data: Vec<[f32; 4]> = (0..count).map(|i| if count == 1 { [0.2, 0.4, 0.6, 0.3] } else { entry(i) }).collect();
+            let data: Vec<[f32; 4]> =
+                (0..count).map(|i| if count == 1 { [0.2, 0.4, 0.6, 0.3] } else { entry(i) }).collect();
             let table = LookupTable::from_entries(volact_core::Buffer::from_vec(data), Some([10.0, 90.0]));
             let scene = around([lut(&usual(), table.expect("entries"), 1.0)]);
             rig.lattice("picture", &scene, &How::step(0.3)).map(|_| ())
@@ -95,15 +96,16 @@ fn entries(topic: &mut Topic) {
 }
 
 fn pictures(topic: &mut Topic) {
-    let sharp = || {
-        colors(&[(48.0, [1.0, 0.2, 0.1], 0.0), (50.0, [1.0, 0.9, 0.1], 0.6), (52.0, [0.1, 0.2, 1.0], 0.0)])
-    };
+    let sharp = || colors(&[(48.0, [1.0, 0.2, 0.1], 0.0), (50.0, [1.0, 0.9, 0.1], 0.6), (52.0, [0.1, 0.2, 1.0], 0.0)]);
     for (name, table) in [
         ("sharp_peak", sharp()),
         ("opaque_above", greys(&[(60.0, 0.1, 0.0), (75.0, 0.9, 1.0)])),
         ("narrow_window", LookupTable::window_level(8.0, 60.0, 0.6).expect("a window")),
         ("falling", colors(&[(20.0, [1.0, 0.5, 0.2], 0.6), (80.0, [0.2, 0.5, 1.0], 0.0)])),
-        ("two_humps", greys(&[(20.0, 0.2, 0.0), (35.0, 0.9, 0.4), (50.0, 0.2, 0.0), (70.0, 0.7, 0.5), (90.0, 1.0, 0.0)])),
+        (
+            "two_humps",
+            greys(&[(20.0, 0.2, 0.0), (35.0, 0.9, 0.4), (50.0, 0.2, 0.0), (70.0, 0.7, 0.5), (90.0, 1.0, 0.0)]),
+        ),
     ] {
         topic.case(name, "a picture agrees with the lattice, whatever the table", move |rig| {
             rig.lattice("picture", &around([lut(&usual(), table.clone(), 1.0)]), &How::step(0.3)).map(|_| ())
@@ -115,18 +117,29 @@ fn pictures(topic: &mut Topic) {
 }
 
 fn interpolation(topic: &mut Topic) {
-    topic.case("pre_interpolated", "on request colour and opacity are computed at the voxels, then interpolated", |rig| {
-        let scene = around([lut(&usual(), warm().pre_interpolated(), 1.0)]);
-        rig.lattice("picture", &scene, &How::step(0.3)).map(|_| ())
-    });
+    topic.case(
+        "pre_interpolated",
+        "on request colour and opacity are computed at the voxels, then interpolated",
+        |rig| {
+            let scene = around([lut(&usual(), warm().pre_interpolated(), 1.0)]);
+            rig.lattice("picture", &scene, &How::step(0.3)).map(|_| ())
+        },
+    );
     topic.case("pre_interpolated_is_post_where_linear", "identical where the table is linear", |rig| {
         let linear = || colors(&[(0.0, [0.1, 0.9, 0.3], 0.0), (100.0, [0.1, 0.9, 0.3], 0.6)]);
-        let (post, pre) = (around([lut(&usual(), linear(), 1.0)]), around([lut(&usual(), linear().pre_interpolated(), 1.0)]));
+        let (post, pre) =
+            (around([lut(&usual(), linear(), 1.0)]), around([lut(&usual(), linear().pre_interpolated(), 1.0)]));
         let (a, b) = (rig.draw(&pre, &How::step(0.3))?, rig.draw(&post, &How::step(0.3))?);
         rig.alike("variant", &pre, &a, &b)
     });
-    topic.needing(&[Need::Option("classification")], "pre_integrated", "pre-integration has the truth of its lattice", |rig| {
-        let table = colors(&[(40.0, [1.0, 0.2, 0.1], 0.0), (55.0, [1.0, 0.9, 0.1], 0.5), (70.0, [0.1, 0.2, 1.0], 0.1)]);
-        rig.lattice("picture", &around([lut(&usual(), table, 1.0)]), &How::segments(0.6)).map(|_| ())
-    });
+    topic.needing(
+        &[Need::Option("classification")],
+        "pre_integrated",
+        "pre-integration has the truth of its lattice",
+        |rig| {
+            let table =
+                colors(&[(40.0, [1.0, 0.2, 0.1], 0.0), (55.0, [1.0, 0.9, 0.1], 0.5), (70.0, [0.1, 0.2, 1.0], 0.1)]);
+            rig.lattice("picture", &around([lut(&usual(), table, 1.0)]), &How::segments(0.6)).map(|_| ())
+        },
+    );
 }

@@ -81,7 +81,8 @@ fn lit(topic: &mut Topic) {
     ] {
         let about = "gradients are in world units, through the inverse transpose";
         topic.needing(&[Need::Shader("gradient")], format!("lit_{name}"), about, move |rig| {
-            let look = look("gradient", warm(), 1.0).with("light", "directional").with("lightdir", DVec3::new(0.3, -0.8, 0.5));
+            let look =
+                look("gradient", warm(), 1.0).with("light", "directional").with("lightdir", DVec3::new(0.3, -0.8, 0.5));
             let shape = Shape::around(&usual(), look);
             shape.set_transform(map);
             rig.lattice("picture", &around([shape]), &How::step(0.3)).map(|_| ())

@@ -24,7 +24,8 @@ fn shown([r, g, b, _]: [f32; 4]) -> [u8; 3] {
 /// Difference over tolerance of a pixel.
 fn ratio(sheet: &Sheet, i: usize) -> f32 {
     let (a, b) = (sheet.expected[i], sheet.actual[i]);
-    let off = (0..4).map(|c| (a[c] - b[c]).abs()).fold(0.0f32, |m, d| if d.is_nan() { f32::INFINITY } else { m.max(d) });
+    let off =
+        (0..4).map(|c| (a[c] - b[c]).abs()).fold(0.0f32, |m, d| if d.is_nan() { f32::INFINITY } else { m.max(d) });
     if off == 0.0 { 0.0 } else { off / sheet.tolerance[i].max(f32::MIN_POSITIVE) }
 }
 

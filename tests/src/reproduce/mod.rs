@@ -109,9 +109,10 @@ fn geometry(out: &mut String, geometry: &dyn Geometry) {
         Ok(made) if made.vertices.len() <= MOST_VERTICES => {
             let points = list(made.vertices.iter().map(vector));
             let cells = list(made.tetrahedra.iter().map(|t| format!("{t:?}")));
-            let texture = made.texture_coordinates.as_ref().map_or(String::new(), |t| {
-                format!(", texture_coordinates: [{}]", list(t.iter().map(vector)))
-            });
+            let texture = made
+                .texture_coordinates
+                .as_ref()
+                .map_or(String::new(), |t| format!(", texture_coordinates: [{}]", list(t.iter().map(vector))));
             _ = writeln!(out, "            geometry: Mesh(points: [{points}], tetrahedra: [{cells}]{texture}),");
         }
         Ok(made) => {

@@ -89,8 +89,11 @@ impl Rig<'_> {
         let passed = identical(found, wanted);
         let pixels = found.color.len().min(wanted.color.len());
         let differ = (0..pixels).filter(|&i| found.color[i] != wanted.color[i]).count();
-        let message =
-            if passed { "the same bits".to_owned() } else { format!("{differ} of {pixels} pixels differ, or depths do") };
+        let message = if passed {
+            "the same bits".to_owned()
+        } else {
+            format!("{differ} of {pixels} pixels differ, or depths do")
+        };
         let sheet = (found.color.len() == wanted.color.len()).then(|| Sheet {
             width: found.width,
             height: found.height,
@@ -129,7 +132,14 @@ impl Rig<'_> {
     ///
     /// # Errors
     /// If the steps cannot be drawn, or the action does not follow them (a skip).
-    pub fn slope(&mut self, label: &str, scene: &Scene, how: &How, steps: &[f64], [lo, hi]: [f64; 2]) -> Result<(), Stop> {
+    pub fn slope(
+        &mut self,
+        label: &str,
+        scene: &Scene,
+        how: &How,
+        steps: &[f64],
+        [lo, hi]: [f64; 2],
+    ) -> Result<(), Stop> {
         if !self.subject.has("sample_distance") || self.subject.options.contains_key("sample_distance") {
             return Err(Stop::Skip("the step cannot be set: no option \"sample_distance\", or set by the user".into()));
         }
@@ -141,7 +151,11 @@ impl Rig<'_> {
             if frame.method.sample_distance == 0.0 {
                 // No lattice: the error is rounding at any step.
                 let (found, wanted) = (errors.last().map_or(0.0, |e| e.1), 1e-6);
-                self.holds(label, found <= wanted, &format!("without a lattice the error is {found:.1e}, wanted {wanted:e}"));
+                self.holds(
+                    label,
+                    found <= wanted,
+                    &format!("without a lattice the error is {found:.1e}, wanted {wanted:e}"),
+                );
                 return Ok(());
             }
         }
@@ -159,7 +173,8 @@ impl Rig<'_> {
             (false, false) => (f64::from(*found) - wanted).abs(),
             _ => f64::INFINITY,
         };
-        let worst = frame.depth.iter().zip(wanted).map(error).fold(0.0, |m: f64, e| if e.is_nan() { e } else { m.max(e) });
+        let worst =
+            frame.depth.iter().zip(wanted).map(error).fold(0.0, |m: f64, e| if e.is_nan() { e } else { m.max(e) });
         let passed = frame.depth.len() == wanted.len() && worst <= tolerance;
         let message = format!("depth is off by {worst:.2e}, tolerance {tolerance:.2e}");
         self.claim(label, "closed form", passed, &message, Some(scene));
@@ -208,7 +223,13 @@ impl Rig<'_> {
     ///
     /// # Errors
     /// If the reference does not draw it.
-    pub fn truth(&self, label: &str, scene: &Scene, lattice: Lattice, shift: DVec3) -> Result<Arc<ReferencePicture>, Stop> {
+    pub fn truth(
+        &self,
+        label: &str,
+        scene: &Scene,
+        lattice: Lattice,
+        shift: DVec3,
+    ) -> Result<Arc<ReferencePicture>, Stop> {
         let key = format!("{}/{label}", self.case);
         let truth = self.truths.get(&key, &self.registry, (&scene.shapes, &scene.desc), lattice, shift);
         truth.map_err(|why| Stop::Fail(format!("no truth: {why}")))
@@ -219,7 +240,13 @@ impl Rig<'_> {
         Ok([self.truth(label, scene, lattice, DVec3::ZERO)?, self.truth(label, scene, lattice, shift)?])
     }
 
-    fn tolerance(&self, pair: &[Arc<ReferencePicture>; 2], scene: &Scene, frame: &Frame, lattice: Lattice) -> Tolerance {
+    fn tolerance(
+        &self,
+        pair: &[Arc<ReferencePicture>; 2],
+        scene: &Scene,
+        frame: &Frame,
+        lattice: Lattice,
+    ) -> Tolerance {
         let pair = Pair { truth: &pair[0], moved: &pair[1] };
         let tolerance = Tolerance::derive(pair, &scene.shapes, &frame.method, lattice);
         match &self.extra {
@@ -245,10 +272,7 @@ impl Rig<'_> {
         let message = figures.as_ref().map_or_else(
             || format!("{} pixels, wanted {}", found.len(), wanted.len()),
             |f| {
-                format!(
-                    "max {:.2e} of {:.2e}, rmse {:.2e} of {:.2e}",
-                    f.max, f.max_tolerance, f.rmse, f.rmse_tolerance
-                )
+                format!("max {:.2e} of {:.2e}, rmse {:.2e} of {:.2e}", f.max, f.max_tolerance, f.rmse, f.rmse_tolerance)
             },
         );
         let sheet = sized.then(|| Sheet {

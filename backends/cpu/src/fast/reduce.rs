@@ -4,7 +4,7 @@
 
 use std::marker::PhantomData;
 
-use volact_core::{Compositing, lattice::Lattice};
+use volact_core::{Compositing, lattice::Lattice, mutated};
 
 use super::{
     bounds::{Emptiness, Peaks},
@@ -98,6 +98,7 @@ pub fn merge(into: &mut Reduced, compositing: Compositing, number: f32, length: 
     let number = f64::from(number);
     let first = into.length == 0.0;
     into.value = match compositing {
+        Compositing::Maximum if first && mutated!("maximum_from_zero") => number.max(0.0),
         Compositing::Maximum if first => number,
         Compositing::Minimum if first => number,
         Compositing::Maximum => into.value.max(number),
