@@ -44,11 +44,16 @@ pub fn tabulated(shapes: &[Shape], method: &Method, lattice: Lattice) -> f64 {
         _ => Kind::Nodes,
     };
     let part = |shape: &Shape| of_shape(shape, method.table_width, (step, segments), kind);
-    shapes.iter().map(part).sum()
+    // Each segment's light is some shape's: the shares T·α of all together sum up to at most 1.
+    shapes.iter().map(part).fold(0.0, f64::max)
 }
 
 fn of_shape(shape: &Shape, width: usize, (step, segments): (f64, f64), kind: Kind) -> f64 {
     let state = shape.state();
+    if state.geometry.slices().is_some_and(|s| !s.volume) {
+        // Planes are classified one by one.
+        return 0.0;
+    }
     let table = state.parameters.get("lookup_table");
     let unit = state.parameters.get("unit_distance").and_then(ParameterValue::as_float).unwrap_or(1.0);
     let over = volact_core::shader::builtin()

@@ -6,7 +6,7 @@
 //!
 //! - *the frame*: u·max(1, c), since frames are f32;
 //! - *sums*: 4·u·√n, two products and two sums a segment whose roundings are as often up as down
-//!   (N. Higham, *Accuracy and Stability of Numerical Algorithms*, 2002, section 2.8), and 16·u for the
+//!   (N. Higham, *Accuracy and Stability of Numerical Algorithms*, 2002, section 2.8), and 12·u for the
 //!   lengths and exponentials of the two segments that a shape cuts;
 //!   of fixed-point targets half a step a segment, which do not cancel;
 //! - *positions*: η/δ·|T(δ) − T(0)|, where T(δ) is the true picture of the scene moved by δ voxels
@@ -58,14 +58,19 @@ pub struct Sizes {
     pub voxel: f64,
     /// The diagonal of all shapes in world units.
     pub diagonal: f64,
+    /// Whether segments are summed up: not on planes alone, and not where a value is looked for.
+    pub dense: bool,
 }
 
 impl Sizes {
     /// Of these shapes.
     pub fn of(shapes: &[Shape]) -> Self {
         let (mut samples, mut voxel, mut bounds) = (2.0f64, f64::INFINITY, volact_core::Aabb::EMPTY);
+        let mut dense = false;
         for shape in shapes {
             let state = shape.state();
+            let flat = ["mip", "minip", "average", "xray"].contains(&state.shader.as_str());
+            dense |= !flat && state.geometry.slices().is_none_or(|s| s.volume);
             bounds = bounds.union(&state.world_bounds());
             for value in state.parameters.values() {
                 if let ParameterValue::Volume(texture) = value {
@@ -76,7 +81,13 @@ impl Sizes {
         }
         let diagonal = if bounds.is_empty() { 1.0 } else { bounds.size().length() };
         let voxel = if voxel.is_finite() && voxel > 0.0 { voxel } else { diagonal / 100.0 };
-        Self { samples, voxel, diagonal }
+        Self { samples, voxel, diagonal, dense }
+    }
+
+    /// Segments that are summed up along the longest ray.
+    pub fn segments(&self, lattice: Lattice) -> f64 {
+        let all = lattice.step().map_or(4.0 * self.samples, |h| self.diagonal / h).max(1.0);
+        if self.dense { all } else { 1.0 }
     }
 
     /// By how much the scene is moved, in world units.
@@ -105,11 +116,11 @@ impl Tolerance {
         let (sizes, precision) = (Sizes::of(shapes), Precision::of(method));
         let table = tables::tabulated(shapes, method, lattice);
         let cells = if method.classification.contains("linear in each cell") { CELLS } else { 0.0 };
-        let segments = lattice.step().map_or(4.0 * sizes.samples, |h| sizes.diagonal / h).max(1.0);
+        let segments = sizes.segments(lattice);
         let sums = if precision.fixed {
             precision.blend * segments
         } else {
-            precision.arithmetic.max(precision.blend) * (4.0 * segments.sqrt() + 16.0)
+            precision.arithmetic.max(precision.blend) * (4.0 * segments.sqrt() + 12.0)
         };
         let eta = precision.arithmetic * (4.0 * sizes.samples + 16.0) + precision.weight;
         let mut most = [0.0f64; 7];

@@ -41,7 +41,7 @@ const MUTATIONS: &[Mutation] = &[
     ("average_without_length", "the mean not divided by the length", &["shaders", "clipping"]),
     ("first_in_last_out", "a mesh as one interval from first in to last out", &["geometry"]),
     ("early_termination", "rays that end at a fifth, whatever was declared", &["sampling"]),
-    ("uncut_ends", "the first segment not cut by the shape", &["sampling", "opacity"]),
+    ("uncut_ends", "the first segment not cut by the shape", &["sampling"]),
     ("forgotten_clip", "a shape's own clip forgotten", &["clipping"]),
     ("forgotten_frame_clip", "the frame's clip forgotten", &["clipping", "depth"]),
     ("second_clip_region", "only the first region of a clip looked at", &["clipping"]),

@@ -117,7 +117,10 @@ fn a_strangers_plugin_is_held_to_the_contract() {
     let output = conform(&["--config", config, "--action", "zmax", "--report", page.to_str().unwrap()]);
     let said = text(&output.stdout);
     assert_eq!(output.status.code(), Some(1), "{said}{}", text(&output.stderr));
-    assert!(said.contains("[zmax/a plugin in C] tables::one_point ... skipped: it does not draw shader \"lut\""), "{said}");
+    assert!(
+        said.contains("[zmax/a plugin in C] tables::one_point ... skipped: it does not draw shader \"lut\""),
+        "{said}"
+    );
     let skipped = said.lines().filter(|line| line.contains("... skipped: ")).count();
     assert!(skipped > 200, "{skipped} skipped");
     assert!(said.contains("FAILED"), "it takes the highest of voxels and not of what lies between: {said}");

@@ -165,7 +165,8 @@ impl Bulk for Shared {
 
 fn data(topic: &mut Topic) {
     topic.case("touched_data", "data changed in place are announced by touch, and drawn as they now are", |rig| {
-        let dims = [7usize, 6, 8];
+        let dims = [24usize, 20, 22];
+        let rule = |p: DVec3| super::stock::rule(p / 3.0);
         let bytes = encode(ScalarType::U8, &values(dims, rule));
         let memory = Arc::new(Shared(bytes.iter().map(|_| 50u8.into()).collect()));
         let data =
@@ -176,7 +177,8 @@ fn data(topic: &mut Topic) {
         memory.0.iter().zip(&bytes).for_each(|(to, from)| to.store(*from, Ordering::Relaxed));
         data.touch();
         let after = rig.draw_with(&mut *action, &scene)?;
-        let fresh = Scene::new([lut(&waves(dims, ScalarType::U8), warm(), 1.0)], scene.desc.clone());
+        let fresh = crate::scene::volume(dims, ScalarType::U8, rule);
+        let fresh = Scene::new([lut(&fresh, warm(), 1.0)], scene.desc.clone());
         let wanted = rig.draw(&fresh, &How::step(0.3))?;
         rig.same("as it now is", &fresh, &after, &wanted);
         Ok(())

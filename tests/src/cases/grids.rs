@@ -57,6 +57,7 @@ fn ramps(topic: &mut Topic) {
                         [v, v, v, 1.0]
                     })
                 };
+                rig.because("the first segment is opaque, and the bound counts those of a whole ray");
                 rig.closed("ramp", &scene, &How::step(0.25), &wanted).map(|_| ())
             });
         }

@@ -74,6 +74,7 @@ fn pictures(topic: &mut Topic) {
     });
     topic.needing(&[Need::Shader("gradient")], "lit_picture", about, |rig| {
         let texture = VolumeTexture::new(&volume([7, 6, 8], ScalarType::F32, spoilt));
+        rig.because("beside a NaN moving the scene changes what has weight, and the tolerance with it");
         rig.lattice("picture", &around([shaded("gradient", &texture, warm(), 1.0)]), &How::step(0.3)).map(|_| ())
     });
     let needs = [Need::Shader("attribute"), Need::Geometry("structured_mesh")];

@@ -158,12 +158,12 @@ fn ends(topic: &mut Topic) {
         |rig| {
             let scene = around([lut(&usual(), greys(&[(30.0, 0.3, 0.0), (60.0, 0.8, 0.9)]), 1.0)]);
             for bound in [0.001, 0.05] {
-                let frame = rig.lattice(&format!("at {bound}"), &scene, &How::step(0.3).with("termination", bound))?;
+                let frame = rig.lattice(&format!("at {bound}"), &scene, &How::step(0.06).with("termination", bound))?;
                 let (found, exact) = (frame.method.termination, frame.method.sample_distance == 0.0);
                 rig.holds(&format!("said {bound}"), exact || found <= bound, &format!("the frame says {found}"));
             }
             rig.because("termination bounds what is left, and the light there is dimmer than white");
-            rig.lattice("by default", &scene, &How::bare().with("sample_distance", 0.3).with("classification", "post"))
+            rig.lattice("by default", &scene, &How::bare().with("sample_distance", 0.06).with("classification", "post"))
                 .map(|_| ())
         },
     );

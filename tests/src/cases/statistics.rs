@@ -108,7 +108,9 @@ fn costs(topic: &mut Topic) {
                 rig.holds("counted", frame.statistics.samples > 0, "samples are counted");
                 return Ok(());
             }
-            samples.push(frame.statistics.samples + frame.statistics.skipped);
+            let (taken, skipped) = (frame.statistics.samples, frame.statistics.skipped);
+            rig.holds(&format!("taken at {step}"), taken > 0, &format!("{taken} samples taken, {skipped} skipped"));
+            samples.push(taken + skipped);
         }
         let doubles = samples.windows(2).all(|w| (1.6..2.4).contains(&(w[1] as f64 / w[0] as f64)));
         rig.holds("twice as many", doubles, &format!("{samples:?} at 0.8, 0.4, 0.2"));

@@ -76,6 +76,7 @@ fn entries(topic: &mut Topic) {
                 (0..count).map(|i| if count == 1 { [0.2, 0.4, 0.6, 0.3] } else { entry(i) }).collect();
             let table = LookupTable::from_entries(volact_core::Buffer::from_vec(data), Some([10.0, 90.0]));
             let scene = around([lut(&usual(), table.expect("entries"), 1.0)]);
+            rig.because("the bound counts the segments of the longest ray, and few rays are as long");
             rig.lattice("picture", &scene, &How::step(0.3)).map(|_| ())
         });
     }
@@ -122,6 +123,7 @@ fn interpolation(topic: &mut Topic) {
         "on request colour and opacity are computed at the voxels, then interpolated",
         |rig| {
             let scene = around([lut(&usual(), warm().pre_interpolated(), 1.0)]);
+            rig.because("the bound counts the segments of the longest ray, and few rays are as long");
             rig.lattice("picture", &scene, &How::step(0.3)).map(|_| ())
         },
     );

@@ -11,6 +11,7 @@ use crate::{
     method::Lattice,
     metrics::{identical, order, rms_error, wide},
     outcome::{Check, Figures, Sheet},
+    report::VARIANT,
     reproduce,
     tolerance::{Pair, Sizes, Tolerance},
     truth::chain,
@@ -124,7 +125,7 @@ impl Rig<'_> {
         let mut tolerance = self.tolerance(&pair, scene, found, lattice);
         tolerance.pixels.iter_mut().for_each(|t| *t *= 2.0);
         tolerance.parts.push(("twice, since both round".into(), 2.0));
-        self.compare(label, "a variant", scene, found, &wide(wanted), &tolerance);
+        self.compare(label, VARIANT, scene, found, &wide(wanted), &tolerance);
         Ok(())
     }
 
@@ -321,6 +322,20 @@ fn figures(found: &[[f64; 4]], wanted: &[[f64; 4]], tolerance: &Tolerance, reaso
         // JSON has no infinity.
         room: room.min(1e9),
         parts: tolerance.parts.clone(),
-        reason,
+        reason: reason.or_else(|| stated(tolerance)),
+    }
+}
+
+/// The reason for more room where a bound for the worst place is most of the tolerance.
+fn stated(tolerance: &Tolerance) -> Option<String> {
+    let part = |name: &str| tolerance.parts.iter().filter(|(n, _)| n == name).map(|(_, v)| *v).sum::<f64>();
+    let all: f64 = ["frame", "sums", "positions", "tables", "cells"].into_iter().map(part).sum();
+    let mostly = |name: &str| part(name) > 0.5 * all;
+    if mostly("tables") {
+        Some("most of it bounds the worst interval of the table, in which few samples fall".into())
+    } else if mostly("cells") {
+        Some("most of it bounds the worst cell, of the strongest colours and the deepest".into())
+    } else {
+        None
     }
 }

@@ -144,7 +144,8 @@ impl<'a, S: Simd, F: Fetch> Extreme<'a, S, F> {
     #[inline(always)]
     unsafe fn new(job: &'a Job<'a>, ends: &[Reduced; LANES]) -> Self {
         let sign = if job.compositing == Compositing::Maximum { 1.0 } else { -1.0 };
-        let best = ends.map(|e| if e.length > 0.0 { sign * e.value as f32 } else { f32::NEG_INFINITY });
+        let least = if mutated!("maximum_from_zero") { 0.0 } else { f32::NEG_INFINITY };
+        let best = ends.map(|e| if e.length > 0.0 { sign * e.value as f32 } else { least });
         let range = job.range.filter(|_| !job.voxels.scalar.is_float());
         let limit = range.map_or(f32::INFINITY, |[lo, hi]| if sign > 0.0 { hi } else { -lo });
         // SAFETY: the caller's promises.
