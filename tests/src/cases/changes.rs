@@ -166,9 +166,9 @@ impl Bulk for Shared {
 fn data(topic: &mut Topic) {
     topic.case("touched_data", "data changed in place are announced by touch, and drawn as they now are", |rig| {
         let dims = [24usize, 20, 22];
-        let rule = |p: DVec3| super::stock::rule(p / 3.0);
-        let bytes = encode(ScalarType::U8, &values(dims, rule));
-        let memory = Arc::new(Shared(bytes.iter().map(|_| 50u8.into()).collect()));
+        let coarse = |p: DVec3| rule(p / 3.0);
+        let bytes = encode(ScalarType::U8, &values(dims, coarse));
+        let memory = Arc::new(Shared(bytes.iter().map(|_| 0u8.into()).collect()));
         let data =
             Volume::new(VolumeDesc::new(dims, ScalarType::U8, 1), Buffer::shared(memory.clone())).expect("a volume");
         let scene = around([lut(&data, warm(), 1.0)]);
@@ -177,7 +177,7 @@ fn data(topic: &mut Topic) {
         memory.0.iter().zip(&bytes).for_each(|(to, from)| to.store(*from, Ordering::Relaxed));
         data.touch();
         let after = rig.draw_with(&mut *action, &scene)?;
-        let fresh = crate::scene::volume(dims, ScalarType::U8, rule);
+        let fresh = crate::scene::volume(dims, ScalarType::U8, coarse);
         let fresh = Scene::new([lut(&fresh, warm(), 1.0)], scene.desc.clone());
         let wanted = rig.draw(&fresh, &How::step(0.3))?;
         rig.same("as it now is", &fresh, &after, &wanted);

@@ -94,7 +94,8 @@ fn orders(topic: &mut Topic) {
 
 /// Changed between begin_draw and draw, in each of the ways.
 fn late(topic: &mut Topic) {
-    let changes: Vec<(&str, fn(&Shape))> = vec![
+    type Change = fn(&Shape);
+    let changes: Vec<(&str, Change)> = vec![
         ("transform", |s| s.set_transform(DAffine3::from_translation(DVec3::X))),
         ("table", |s| s.set_parameter("lookup_table", warm())),
         ("shader", |s| s.set_shader("simple")),

@@ -166,7 +166,8 @@ fn fields(topic: &mut Topic) {
 fn holding(topic: &mut Topic) {
     let inside = || look("lut", warm(), 1.0).with("volume", VolumeTexture::new(&usual()));
     let center = DVec3::new(3.0, 2.5, 3.5);
-    let makers: Vec<(&str, Box<dyn Fn() -> Shape + Send + Sync>)> = vec![
+    type Make = Box<dyn Fn() -> Shape + Send + Sync>;
+    let makers: Vec<(&str, Make)> = vec![
         ("sphere", Box::new(move || Shape::new(Sphere::new(center, 2.9, 12).expect("a ball"), inside()))),
         (
             "cylinder",

@@ -244,7 +244,7 @@ fn parts(topic: &mut Topic) {
 /// Each way of sampling that an action declares.
 fn choices(topic: &mut Topic) {
     let about = "whatever of its choices an action is set to, it draws the lattice that it says";
-    topic.case("every_choice_of_every_option", about, |rig| every_choice(rig));
+    topic.case("every_choice_of_every_option", about, every_choice);
 }
 
 fn every_choice(rig: &mut Rig<'_>) -> Verdict {

@@ -334,13 +334,14 @@ impl<'a> Part<'a> {
             _ if shaded::wanted(shape) => (Self::shaded(shape, &region, resources, lattice, eyes)?, None),
             Some(texture) => {
                 let tables = resources.tables(shape.id)?;
+                let early = mutated!("early_termination") && eyes.settings.termination > 0.0;
                 let job = over::Job {
                     unit: eyes.settings.unit,
                     voxels: voxels(shape, texture).0,
                     lattice,
                     classes: tables.classes(),
                     empty: tables.empty.as_ref(),
-                    termination: eyes.settings.termination as f32,
+                    termination: if early { 0.2 } else { eyes.settings.termination as f32 },
                     threshold: eyes.threshold,
                 };
                 (Content::Voxels(Box::new(job)), Some(Medium::new(shape, texture)))
