@@ -153,7 +153,7 @@ fn own(topic: &mut Topic) {
 }
 
 fn others(topic: &mut Topic) {
-    for shader in ["mip", "average", "xray", "isosurface", "gradient"] {
+    for shader in ["mip", "average", "isosurface", "gradient"] {
         topic.needing(&[Need::Shader(shader)], format!("clips_{shader}"), "whatever the shader", move |rig| {
             let table = if shader == "isosurface" { "surfaces" } else { "lookup_table" };
             let look = volact_core::Appearance::new(shader).with(table, warm()).with("unit_distance", 4.0);
