@@ -2,7 +2,7 @@
 //!
 //! A site in an action asks [`mutated!`](crate::mutated) for a fault by name. Without the feature
 //! `mutations` the answer is a constant `false`, and nothing of it is compiled. With it one fault at
-//! a time can be [`set`] for the whole process; a build with the feature is for the suite's own
+//! a time can be `set` for the whole process; a build with the feature is for the suite's own
 //! test, and for nothing else.
 
 /// A fault's name as a number, at compile time: FNV-1a (<http://www.isthe.com/chongo/tech/comp/fnv>).

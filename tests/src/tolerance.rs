@@ -13,7 +13,7 @@
 //!   obliquely. A position of index N rounds by u·N in each of some four operations, the seven
 //!   roundings of an interpolation act like a shift of a few u, and a weight of b bits is off by
 //!   2⁻⁽ᵇ⁺¹⁾: η = u·(4·N + 16) + weight;
-//! - *tables*: linear interpolation between the nodes that the frame reports ([`tables`](crate::tables));
+//! - *tables*: linear interpolation between the nodes that the frame reports ([`tables`]);
 //! - *cells*: 1.5e-5 where numbers of meshes are `linear in each cell` of f32: the colour of a stretch
 //!   is taken as linear in optical depth up to there;
 //! - *ends*: the transmittance at which rays end, if they do;
