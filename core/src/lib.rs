@@ -19,6 +19,7 @@ pub mod lattice;
 pub mod lifecycle;
 pub mod loader;
 pub mod mesh_data;
+pub mod mutation;
 pub mod names;
 
 pub mod null;

@@ -1,4 +1,4 @@
-//! `cargo xtask test` and `cargo xtask check`.
+//! `cargo xtask test`, `cargo xtask conformance` and `cargo xtask check`.
 
 use std::{env, path::Path, process::Command};
 
@@ -19,6 +19,13 @@ pub fn all() -> Result<()> {
     cargo(&["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"], &[])?;
     cargo(&["doc", "--workspace", "--no-deps"], &[("RUSTDOCFLAGS", "-D warnings")])?;
     test()
+}
+
+/// The conformance suite on the project's own actions, and on faults made in them.
+pub fn conformance() -> Result<()> {
+    cargo(&["test", "-p", "volact-conformance", "--test", "conformance"], &[])?;
+    let faults = ["--features", "mutations", "--test", "mutations", "--", "--nocapture"];
+    cargo(&[&["test", "-p", "volact-conformance"][..], &faults].concat(), &[])
 }
 
 fn cargo(args: &[&str], variables: &[(&str, &str)]) -> Result<()> {

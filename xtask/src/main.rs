@@ -26,6 +26,8 @@ enum Task {
     Test,
     /// Run the suite, the formatter, the linter and the documentation, as .ci/run does.
     Check,
+    /// Hold the project's own actions to the contract, and see that faults made in them are caught.
+    Conformance,
     /// Draw one scene of the peers' folder and print its row.
     Peer(peer::Args),
     /// Compare with other renderers in one run, interleaved, and write the tables.
@@ -48,6 +50,7 @@ fn main() -> anyhow::Result<()> {
     match Args::parse().task {
         Task::Test => check::test(),
         Task::Check => check::all(),
+        Task::Conformance => check::conformance(),
         Task::Peer(args) => peer::run(&args),
         Task::Peers(args) => peers::run(&args),
         Task::MeshPeers(args) => mesh_peers::run(&args),

@@ -5,6 +5,7 @@ pub mod bare;
 pub mod bench;
 pub mod compare;
 pub mod completions;
+pub mod conform;
 pub mod cuts;
 pub mod describe;
 pub mod info;
@@ -40,6 +41,8 @@ pub enum Command {
     Plugins(plugins::Args),
     /// Compare two pictures; exits with 1 where they differ by more than a threshold
     Compare(compare::Args),
+    /// Hold an action to the contract, with a report
+    Conform(conform::Args),
     /// Measure how fast a scene is drawn
     Bench(bench::Args),
     /// Print completions for a shell
@@ -69,6 +72,7 @@ impl Command {
                 None => Ok(ExitCode::SUCCESS),
             },
             Self::Compare(args) => compare::run(args, &registry),
+            Self::Conform(args) => conform::run(args, &registry),
             Self::Bench(args) => bench::run(args, &registry),
             Self::Completions(args) => completions::run(args, &registry),
         }
@@ -95,6 +99,7 @@ impl Command {
         let named = match self {
             Self::Render(args) => args.config(),
             Self::Bench(args) => args.config(),
+            Self::Conform(args) => args.config(),
             Self::Info(_) | Self::Describe(_) | Self::Plugins(_) => None,
             Self::Compare(_) | Self::Completions(_) => return Ok(None),
         };

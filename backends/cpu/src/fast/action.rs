@@ -7,6 +7,7 @@ use volact_core::{
     Warning, WarningCode,
     frame::Rebuild,
     lifecycle::Lifecycle,
+    mutated,
     parameter::{ParameterProblem, ProblemKind},
     resolve::ResolvedShape,
 };
@@ -146,8 +147,18 @@ impl RenderAction for CpuAction {
         let prepare = start.elapsed();
         let mut frame = Frame::empty(&open.desc);
         let picture = Picture::new(&open, &drawn, &self.resources, &self.settings, &plan)?;
-        let counts = picture.draw(&mut frame);
+        let mut counts = picture.draw(&mut frame);
         picture.check()?;
+        if mutated!("uncounted_samples") {
+            counts.samples = 0;
+        }
+        if mutated!("empty_frame_is_black") && drawn.is_empty() {
+            frame.color = frame.color.iter().map(|_| [0.0, 0.0, 0.0, 1.0]).collect();
+        }
+        if mutated!("background_in_the_frame") {
+            frame.color =
+                frame.over_background().iter().zip(frame.color.iter()).map(|(c, a)| [c[0], c[1], c[2], a[3]]).collect();
+        }
         frame.warnings = drawn.iter().flat_map(|s| s.warnings.clone()).collect();
         if counts.rays == 0 && !drawn.is_empty() {
             let message = "no ray meets any shape; check camera, near and far, and transforms";

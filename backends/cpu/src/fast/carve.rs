@@ -1,6 +1,6 @@
 //! Where rays are inside a mesh, by its boundary alone: what lies between is not looked at.
 
-use volact_core::glam::DVec3;
+use volact_core::{glam::DVec3, mutated};
 
 use super::{
     mesh::build::Linked,
@@ -46,6 +46,11 @@ impl Carver {
         }
         if depth > 0 {
             add(&mut self.stretches, [since.max(span[0]), span[1]]);
+        }
+        if let ([first, .., last], true) = (self.stretches.as_slice(), mutated!("first_in_last_out")) {
+            let whole = [first[0], last[1]];
+            self.stretches.clear();
+            self.stretches.push(whole);
         }
         &self.stretches
     }

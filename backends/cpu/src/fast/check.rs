@@ -1,6 +1,6 @@
 //! What `cpu` draws, and the errors for what it does not.
 
-use volact_core::{ActionError, Caps, Compositing, resolve::ResolvedShape};
+use volact_core::{ActionError, Caps, Compositing, mutated, resolve::ResolvedShape};
 
 use super::{options::Settings, shaded};
 
@@ -66,7 +66,9 @@ pub fn check(shape: &ResolvedShape) -> Result<(), ActionError> {
         .map(|t| ("a volume", t.volume().desc().components))
         .or_else(|| shape.attribute("scalars").map(|a| ("scalars", a.components)));
     let wanted = shape.int("component").unwrap_or(0);
-    if let Some((what, count)) = components.filter(|(_, count)| wanted >= *count as i64) {
+    if let Some((what, count)) =
+        components.filter(|(_, count)| wanted >= *count as i64 && !mutated!("component_unchecked"))
+    {
         return unsupported(
             format!("component {wanted} of {what} with {count}"),
             &format!("name one of 0 to {}", count - 1),

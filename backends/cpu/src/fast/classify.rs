@@ -5,7 +5,7 @@
 //! wherever a grid of at most 2¹⁶ intervals can; it is refined until linear interpolation between
 //! nodes is within 1e-6 of the exact exponential, and [`SegmentTable::error`] says what was reached.
 
-use volact_core::table::ResolvedTable;
+use volact_core::{mutated, table::ResolvedTable};
 
 /// Interpolation error that a table is refined to.
 const WANTED_ERROR: f64 = 1e-6;
@@ -168,7 +168,12 @@ impl SegmentTable {
 
 /// Premultiplied colour and opacity of a segment of `h` unit distances.
 pub fn segment([r, g, b, a]: [f64; 4], h: f64) -> [f64; 4] {
+    let h = if mutated!("opacity_exponent") { 1.0 } else { h };
     let alpha = if a >= 1.0 { 1.0 } else { -(h * (-a).ln_1p()).exp_m1() };
+    let alpha = if mutated!("linear_opacity") { (-(-a).ln_1p() * h).min(1.0) } else { alpha };
+    if mutated!("straight_colour") {
+        return [r, g, b, alpha];
+    }
     [r * alpha, g * alpha, b * alpha, alpha]
 }
 

@@ -1,7 +1,8 @@
 //! Shapes that are one picture each: composited by maximum, minimum, average or add.
 
 use volact_core::{
-    ActionError, Clip, Compositing, LookupTable, lattice::Lattice, resolve::ResolvedShape, table::ResolvedTable,
+    ActionError, Clip, Compositing, LookupTable, lattice::Lattice, mutated, resolve::ResolvedShape,
+    table::ResolvedTable,
 };
 
 use super::{
@@ -161,6 +162,10 @@ impl<'a> Reduction<'a> {
     fn classify(&self, reduced: Reduced) -> [f32; 4] {
         let units = self.units;
         let value = match self.job.compositing {
+            Compositing::Add if mutated!("sum_without_unit") => {
+                reduced.value * units.scale + units.offset * reduced.length
+            }
+            Compositing::Average if mutated!("average_without_length") => units.data(reduced.value),
             Compositing::Average => units.data(reduced.value / reduced.length),
             Compositing::Add => (reduced.value * units.scale + units.offset * reduced.length) / self.unit,
             _ => units.data(reduced.value),

@@ -3,6 +3,7 @@
 use volact_core::{
     Clip, FrameDesc, Opaque, ParameterValue, RayGrid, Viewport,
     glam::{DAffine3, DVec3},
+    mutated,
     resolve::ResolvedShape,
 };
 
@@ -140,10 +141,12 @@ impl Drawn<'_> {
             let at = (self.viewport.y + y) * self.width + self.viewport.x + x;
             let color = self.picture.color.as_ref().map(|_| self.picture.color_at(at));
             let t = self.limits[y * self.viewport.width + x];
-            if t < f64::INFINITY {
+            if t < f64::INFINITY && mutated!("forgotten_opaque_depth") {
+                continue;
+            } else if t < f64::INFINITY {
                 ends.add(l, t, color.map(|c| c.map(f64::from)));
             } else {
-                ends.behind[l] = color.unwrap_or_default();
+                ends.behind[l] = if mutated!("forgotten_backdrop") { [0.0; 4] } else { color.unwrap_or_default() };
             }
         }
     }
@@ -172,6 +175,11 @@ impl Wall<'_> {
     fn lit(&self, met: &Meeting, direction: DVec3) -> [f64; 4] {
         // Normals go with the inverse transpose of object to world space.
         let normal = (self.to_object.matrix3.transpose() * met.normal).normalize_or_zero();
+        let normal = if mutated!("normals_not_transposed") {
+            (self.to_object.matrix3.inverse() * met.normal).normalize_or_zero()
+        } else {
+            normal
+        };
         let light = self.light.unwrap_or(-direction);
         let shade = self.ambient + (1.0 - self.ambient) * normal.dot(light).abs();
         let [r, g, b] = self.color.map(|c| c * shade);

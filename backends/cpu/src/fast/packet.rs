@@ -6,7 +6,8 @@
 use volact_core::{
     Aabb,
     camera::LinearRays,
-    glam::{DAffine3, DVec3},
+    glam::{DAffine3, DMat3, DVec3},
+    mutated,
     resolve::ResolvedShape,
 };
 
@@ -39,6 +40,24 @@ impl Place {
         let to_index = shape.volume("volume")?.object_to_index();
         let block = shape.block().filter(|b| !b.is_empty())?;
         Some(Self { to_object: shape.to_object, to_index, block })
+    }
+}
+
+impl Place {
+    /// The same place but for a fault that is asked for.
+    #[must_use]
+    pub fn mutated(self) -> Self {
+        let Self { mut to_object, mut to_index, block } = self;
+        if mutated!("half_voxel") {
+            to_index.translation += DVec3::splat(0.5);
+        }
+        if mutated!("swapped_axes") {
+            to_index = DAffine3::from_mat3(DMat3::from_cols(DVec3::Y, DVec3::X, DVec3::Z)) * to_index;
+        }
+        if mutated!("positions_in_f32") {
+            to_object = DAffine3::from_cols_array(&to_object.to_cols_array().map(|v| f64::from(v as f32)));
+        }
+        Self { to_object, to_index, block }
     }
 }
 
@@ -116,7 +135,8 @@ impl Bundle {
     /// [`RayGrid::ray`]: volact_core::RayGrid::ray
     #[inline(always)]
     pub fn new(w: &LinearRays, [x, y]: [usize; 2], size: [usize; 2]) -> Self {
-        let px = each(|l| (x + l % SIDE) as f64 + 0.5);
+        let half = if mutated!("pixel_corners") { 0.0 } else { 0.5 };
+        let px = each(|l| (x + l % SIDE) as f64 + half);
         let py = each(|l| (y + l / SIDE) as f64 + 0.5);
         let plane = |a: usize| each(|l| w.corner[a] + w.dx[a] * px[l] + w.dy[a] * py[l]);
         let plane = [plane(0), plane(1), plane(2)];
@@ -242,6 +262,7 @@ impl Packet {
     pub fn split(&self, h: f64) -> Cuts {
         let first = each(|l| (self.start[l] / h).ceil());
         let last = each(|l| (self.end[l] / h).floor());
+        let first = if mutated!("uncut_ends") { each(|l| (self.start[l] / h).floor()) } else { first };
         let mut cuts = Cuts { front: [[0.0; 2]; LANES], back: [[0.0; 2]; LANES], from: [0.0; LANES], to: [0.0; LANES] };
         for l in 0..LANES {
             if self.active >> l & 1 == 0 {

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use volact_core::{
     Aabb, ActionError, Attribute, Clip, Compositing, LookupTable, Plane, SliceStyle, camera::LinearRays, glam::DVec3,
-    lattice::Lattice, resolve::ResolvedShape, table::ResolvedTable,
+    lattice::Lattice, mutated, resolve::ResolvedShape, table::ResolvedTable,
 };
 
 use super::{
@@ -83,6 +83,7 @@ impl<'a> Region<'a> {
         });
         let bounds = shape.state.geometry.bounds();
         let block = match (shape.state.geometry.as_block(), texture) {
+            (Some(block), Some(_)) if mesh.is_none() && mutated!("forgotten_roi") => block,
             (Some(block), Some(texture)) if mesh.is_none() => block.intersection(&texture.geometry_roi()),
             (Some(block), None) if mesh.is_none() => block,
             (_, Some(texture)) if bend.is_none() => grown(&bounds).intersection(&texture.geometry_roi()),
@@ -92,7 +93,7 @@ impl<'a> Region<'a> {
             return None;
         }
         let to_index = texture.map(|t| t.object_to_index()).unwrap_or_default();
-        let place = Place { to_object: shape.to_object, to_index, block };
+        let place = Place { to_object: shape.to_object, to_index, block }.mutated();
         let asked = shaded::by_cells(shape) || shaded::wanted(shape) && bend.is_some();
         let cells = mesh.filter(|_| asked).map(|m| Cells {
             mesh: &m.linked,
@@ -129,10 +130,10 @@ impl<'a> Region<'a> {
 
     /// Takes away what is clipped.
     pub fn clip(&self, bundle: &Bundle, stretches: &mut Stretches) {
-        if !self.clip.is_none() {
+        if !self.clip.is_none() && !mutated!("forgotten_clip") {
             stretches.clip(self.clip, &bundle.through(&self.place.to_object));
         }
-        if !self.scene.is_none() {
+        if !self.scene.is_none() && !mutated!("forgotten_frame_clip") {
             stretches.clip(self.scene, &[bundle.origin, bundle.direction]);
         }
     }
@@ -333,13 +334,14 @@ impl<'a> Part<'a> {
             _ if shaded::wanted(shape) => (Self::shaded(shape, &region, resources, lattice, eyes)?, None),
             Some(texture) => {
                 let tables = resources.tables(shape.id)?;
+                let early = mutated!("early_termination") && eyes.settings.termination > 0.0;
                 let job = over::Job {
                     unit: eyes.settings.unit,
                     voxels: voxels(shape, texture).0,
                     lattice,
                     classes: tables.classes(),
                     empty: tables.empty.as_ref(),
-                    termination: eyes.settings.termination as f32,
+                    termination: if early { 0.2 } else { eyes.settings.termination as f32 },
                     threshold: eyes.threshold,
                 };
                 (Content::Voxels(Box::new(job)), Some(Medium::new(shape, texture)))
@@ -429,7 +431,7 @@ impl<'a> Part<'a> {
                     _ => None,
                 };
                 let Some([r, g, b, a]) = rgba else { continue };
-                let a = if slicing.style == SliceStyle::Opaque { 1.0 } else { a };
+                let a = if slicing.style == SliceStyle::Opaque && !mutated!("thin_slices") { 1.0 } else { a };
                 if a > 0.0 {
                     hits.push(Hit { t, color: [r * a, g * a, b * a, a] });
                 }

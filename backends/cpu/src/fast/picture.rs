@@ -5,7 +5,7 @@ use std::sync::Mutex;
 
 use volact_core::{
     ActionError, Compositing, Frame, Viewport, camera::LinearRays, frame::FrameError, lattice::Lattice,
-    lifecycle::OpenFrame, resolve::ResolvedShape,
+    lifecycle::OpenFrame, mutated, resolve::ResolvedShape,
 };
 
 use super::{
@@ -49,7 +49,9 @@ impl<'a> Picture<'a> {
     ) -> Result<Self, ActionError> {
         let (desc, viewport) = (&open.desc, open.desc.viewport());
         let grid = desc.camera.rays(&viewport).map_err(FrameError::from)?;
-        let (lattice, threshold) = (Lattice { step: plan.step }, desc.depth_threshold);
+        let threshold =
+            if mutated!("depth_threshold") { 1.0 - 0.9 * desc.depth_threshold } else { desc.depth_threshold };
+        let lattice = Lattice { step: plan.step };
         let rays = grid.linear();
         let eyes = Eyes { rays: &rays, size: [viewport.width, viewport.height], settings, threshold };
         let part = |shape| Part::new(shape, &desc.clip, resources, lattice, &eyes);
@@ -59,8 +61,11 @@ impl<'a> Picture<'a> {
         };
         let mut parts: Vec<Part<'a>> =
             of(&|c| matches!(c, Compositing::Over | Compositing::First)).filter_map(part).collect();
-        parts.sort_by_key(|part| part.id);
-        let termination = settings.termination as f32;
+        if !mutated!("order_of_drawing") {
+            parts.sort_by_key(|part| part.id);
+        }
+        let early = mutated!("early_termination") && settings.termination > 0.0;
+        let termination = if early { 0.2 } else { settings.termination as f32 };
         Ok(Self {
             rays,
             viewport,
@@ -113,13 +118,31 @@ impl<'a> Picture<'a> {
                 for l in 0..LANES {
                     let (px, py) = (x + l % SIDE, y + l / SIDE);
                     if px < self.viewport.width && py < rows {
-                        let at = py * width + self.viewport.x + px;
-                        color[at] = pixels.color[l];
+                        let left = if mutated!("viewport_to_the_left") { 0 } else { self.viewport.x };
+                        let at = py * width + left + px;
+                        color[at] = self.mutated(pixels.color[l]);
                         depth[at] = (pixels.depth[l] - bundle.depth_zero) as f32;
+                        if mutated!("depth_from_the_origin") {
+                            depth[at] = pixels.depth[l] as f32;
+                        }
                     }
                 }
             }
         }
+    }
+
+    /// The same colour but for a fault that is asked for.
+    fn mutated(&self, color: [f32; 4]) -> [f32; 4] {
+        if mutated!("eight_bit_target") {
+            return color.map(|v| (v * 255.0).round() / 255.0);
+        }
+        if mutated!("threads_matter") && self.settings.threads == 3 {
+            return color.map(|v| v * (1.0 - f32::EPSILON));
+        }
+        if mutated!("upside_down_colours") {
+            return [color[2], color[1], color[0], color[3]];
+        }
+        color
     }
 
     /// The first failure of a shader's program, if there was one.

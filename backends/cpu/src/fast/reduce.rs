@@ -4,7 +4,7 @@
 
 use std::marker::PhantomData;
 
-use volact_core::{Compositing, lattice::Lattice};
+use volact_core::{Compositing, lattice::Lattice, mutated};
 
 use super::{
     bounds::{Emptiness, Peaks},
@@ -98,6 +98,7 @@ pub fn merge(into: &mut Reduced, compositing: Compositing, number: f32, length: 
     let number = f64::from(number);
     let first = into.length == 0.0;
     into.value = match compositing {
+        Compositing::Maximum if first && mutated!("maximum_from_zero") => number.max(0.0),
         Compositing::Maximum if first => number,
         Compositing::Minimum if first => number,
         Compositing::Maximum => into.value.max(number),
@@ -143,7 +144,8 @@ impl<'a, S: Simd, F: Fetch> Extreme<'a, S, F> {
     #[inline(always)]
     unsafe fn new(job: &'a Job<'a>, ends: &[Reduced; LANES]) -> Self {
         let sign = if job.compositing == Compositing::Maximum { 1.0 } else { -1.0 };
-        let best = ends.map(|e| if e.length > 0.0 { sign * e.value as f32 } else { f32::NEG_INFINITY });
+        let least = if mutated!("maximum_from_zero") { 0.0 } else { f32::NEG_INFINITY };
+        let best = ends.map(|e| if e.length > 0.0 { sign * e.value as f32 } else { least });
         let range = job.range.filter(|_| !job.voxels.scalar.is_float());
         let limit = range.map_or(f32::INFINITY, |[lo, hi]| if sign > 0.0 { hi } else { -lo });
         // SAFETY: the caller's promises.

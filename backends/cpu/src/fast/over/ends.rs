@@ -3,6 +3,8 @@
 #![expect(clippy::needless_range_loop, reason = "a lane indexes several arrays")]
 
 use super::{Classes, Job, Pixels, part_of, power, under};
+use volact_core::mutated;
+
 use crate::fast::{
     classify::SegmentTable,
     dispatch,
@@ -148,7 +150,8 @@ pub unsafe fn slots<S: Simd>(
     let (mut index, mut fraction) = ([0i32; LANES], [0f32; LANES]);
     // SAFETY: the caller's promises.
     unsafe {
-        let live = if job.voxels.scalar.is_float() { live & !S::nan_bits(value) } else { live };
+        let known = mutated!("nan_is_a_number");
+        let live = if job.voxels.scalar.is_float() && !known { live & !S::nan_bits(value) } else { live };
         let (node, f) = node::<S>(value, table.scale, table.offset, table.nodes);
         let nothing = S::splat_int(16 * table.transparent() as i32);
         S::store_int(S::select_int(live, S::shl::<4>(node), nothing), &mut index);

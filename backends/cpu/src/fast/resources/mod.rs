@@ -15,6 +15,7 @@ use volact_core::{
     action::Watch,
     frame::Rebuild,
     glam::{DAffine3, DVec3},
+    mutated,
     resolve::ResolvedShape,
     volume::Components,
 };
@@ -127,6 +128,9 @@ pub fn voxels<'a>(shape: &ResolvedShape, texture: &'a VolumeTexture) -> (Voxels<
     let desc = texture.volume().desc();
     let mut voxels = Voxels::new(texture, component(shape));
     let mut units = Units { scale: desc.slope, offset: desc.intercept };
+    if mutated!("forgotten_slope") {
+        units = Units { scale: 1.0, offset: 0.0 };
+    }
     let wide = matches!(desc.scalar, ScalarType::F64 | ScalarType::U32 | ScalarType::I32);
     if wide || desc.scalar.is_float() {
         // f32 cannot hold these: fetch them relative to the values that the table tells apart,
@@ -159,7 +163,8 @@ fn key_of(texture: &VolumeTexture, voxels: &Voxels<'_>) -> BoundsKey {
     let volume = texture.volume();
     let roi = [min[0], min[1], min[2], max[0], max[1], max[2]];
     let units = [voxels.origin.to_bits(), voxels.gain.to_bits()];
-    BoundsKey { volume: volume.id(), version: volume.version(), component: voxels.component, roi, units }
+    let version = if mutated!("stale_data") { 0 } else { volume.version() };
+    BoundsKey { volume: volume.id(), version, component: voxels.component, roi, units }
 }
 
 /// How a shape's numbers are reduced: a map to data units that falls makes a maximum of the

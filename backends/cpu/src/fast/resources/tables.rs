@@ -1,7 +1,8 @@
 //! What whole segments of a shape add, and where nothing of it can be seen.
 
 use volact_core::{
-    TableInterpolation, VolumeTexture, glam::DVec3, resolve::ResolvedShape, table::ResolvedTable, volume::Components,
+    TableInterpolation, VolumeTexture, glam::DVec3, mutated, resolve::ResolvedShape, table::ResolvedTable,
+    volume::Components,
 };
 
 use super::{BoundsKey, density, voxels};
@@ -44,7 +45,7 @@ impl TableKey {
     ) -> Option<Self> {
         let post = settings.classification == Classification::Post;
         Some(Self {
-            table: shape.table("lookup_table").map_or(0, |t| t.id()),
+            table: if mutated!("stale_table") { 0 } else { shape.table("lookup_table").map_or(0, |t| t.id()) },
             range: texture.range(),
             bounds,
             nearest: texture.filter() == volact_core::Filter::Nearest,
@@ -86,7 +87,8 @@ impl Tables {
     ) -> Self {
         let (voxels, units) = voxels(shape, texture);
         let length = key.step / key.unit;
-        let resolved = shape.table("lookup_table").map(|t| (t.interpolation(), t.resolve(key.range)));
+        let range = if mutated!("entries_from_0_to_1") { [0.0, 1.0] } else { key.range };
+        let resolved = shape.table("lookup_table").map(|t| (t.interpolation(), t.resolve(range)));
         let bounds = bounds.filter(|_| settings.skipping);
         let (made, empty) = match resolved {
             None => {

@@ -11,6 +11,7 @@ use crate::fast::{
     simd::{LANES, Simd},
     walk::ALL,
 };
+use volact_core::mutated;
 
 /// What sixteen rays have seen so far.
 #[derive(Clone, Debug)]
@@ -120,7 +121,7 @@ unsafe fn mixture<S: Simd>(first: [S::F; 4], rows: &[Option<&Row>]) -> [S::F; 4]
             sum[3] = S::fma(left, entry[3], sum[3]);
             left = S::sub(one, sum[3]);
         }
-        if several == 0 {
+        if several == 0 || mutated!("overlap_unweighted") {
             return sum;
         }
         let mut parts = Parts::<S> { mean: [zero; 3], weight: zero, solid: [zero; 4] };
