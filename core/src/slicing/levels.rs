@@ -111,7 +111,7 @@ impl Slabs {
             let near = ((bound - self.anchor) / self.step - 0.5).floor();
             let mut k = near as i64;
             // Beyond, numbers are not told apart, and plans are refused.
-            if !(near.abs() < 1e15) {
+            if near.is_nan() || near.abs() > 1e15 {
                 return k;
             }
             while above(self.middle(k)) {

@@ -63,6 +63,7 @@
 
 mod block;
 mod cells;
+mod choice;
 mod hull;
 mod levels;
 mod order;

@@ -2,13 +2,14 @@
 
 use std::sync::Arc;
 
-use glam::{DAffine3, DVec3};
+use glam::DVec3;
 
 use super::{
-    Body, Levels, Order, PixelMap, Sampling, SamplingMode, SamplingSpace, Slabs, SlicingError, Solid, Step, Sweep,
+    Body, Levels, Order, PixelMap, Sampling, SamplingSpace, Slabs, SlicingError, Solid, Step, Sweep,
     block::{BlockCorners, facets},
     cells::{Cells, Run},
-    order::{Relation, Sight, Solidly, ranks},
+    choice::{clusters, in_order, levels},
+    order::{Sight, Solidly, ranks},
 };
 use crate::{Clip, FrameDesc, LinearRays, Plane, geometry::ClipRegion};
 
@@ -150,12 +151,12 @@ impl<'a> Slicing<'a> {
             // Wherever the lattice begins.
             for (step, range) in steps.iter_mut().zip(ranges) {
                 let extent = (range[1] - range[0]).max(0.0);
-                *step = sampling.widened(*step, extent, |h| (extent / h).ceil() as usize + 1);
+                *step = sampling.widened(*step, extent, |h| ((extent / h).ceil() as usize).saturating_add(1));
             }
         } else if let Some(&step) = steps.first() {
             let unions = unions(levels, ranges);
             let extent = unions.iter().map(|r| (r[1] - r[0]).max(0.0)).sum();
-            let count = |h| unions.iter().map(|r| slab(r, h, 0.0)).sum();
+            let count = |h| unions.iter().map(|r| slab(r, h, 0.0)).fold(0, usize::saturating_add);
             steps.fill(sampling.widened(step, extent, count));
         }
         if !steps.is_empty() {
@@ -309,77 +310,6 @@ fn ends(linear: &LinearRays) -> Option<ClipRegion> {
     (!planes.is_empty()).then(|| ClipRegion::planes(planes))
 }
 
-/// The levels of each shape.
-fn levels(solids: &[&Solid], boxes: &[Solidly], mode: SamplingMode, linear: &LinearRays) -> Vec<Levels> {
-    let origin = linear.eye.unwrap_or(DVec3::ZERO);
-    let planes = Levels::Planes { normal: linear.axis, origin };
-    match (mode, linear.eye) {
-        (SamplingMode::SphericalShells, Some(center)) => vec![Levels::Shells { center }; solids.len()],
-        (SamplingMode::AxisAligned, eye) => {
-            let mut known: Vec<DVec3> = Vec::new();
-            let of = |(solid, solidly): (&&Solid, &Solidly)| {
-                let towards = eye.map_or(linear.direction, |eye| solidly.center() - eye);
-                let normal = face_towards(solid.to_object(), towards, linear);
-                // Shapes that turn the same way share their planes to the last bit.
-                let same = known.iter().copied().find(|n| n.dot(normal) > 1.0 - 1e-14);
-                let normal = same.unwrap_or_else(|| {
-                    known.push(normal);
-                    normal
-                });
-                Levels::Planes { normal, origin }
-            };
-            solids.iter().zip(boxes).map(of).collect()
-        }
-        _ => vec![planes; solids.len()],
-    }
-}
-
-/// The unit normal of the faces of object space that turn most towards the eye.
-fn face_towards(to_object: &DAffine3, towards: DVec3, linear: &LinearRays) -> DVec3 {
-    let rows = to_object.matrix3.transpose();
-    let normals = [rows.x_axis, rows.y_axis, rows.z_axis].map(|r| r.try_normalize().unwrap_or(linear.axis));
-    let turned = |n: &&DVec3| n.dot(towards).abs();
-    let best = normals.iter().max_by(|a, b| turned(a).total_cmp(&turned(b))).copied().unwrap_or(linear.axis);
-    // With an eye the sense says nothing but must be the same for all; without, levels rise away.
-    let sense = if linear.eye.is_some() { linear.axis } else { linear.direction };
-    if best.dot(sense) < 0.0 { -best } else { best }
-}
-
-/// Shapes that have to be swept together: all of one kind of planes, or those that overlap.
-fn clusters(
-    solids: &[&Solid],
-    boxes: &[Solidly],
-    levels: &[Levels],
-    sight: Sight,
-) -> Result<Vec<Vec<usize>>, SlicingError> {
-    let all: Vec<usize> = (0..solids.len()).collect();
-    if levels.windows(2).all(|l| l[0] == l[1]) {
-        return Ok(if all.is_empty() { Vec::new() } else { vec![all] });
-    }
-    let mut group: Vec<usize> = all.clone();
-    for i in 0..solids.len() {
-        for j in i + 1..solids.len() {
-            if boxes[i].relation(&boxes[j], sight) != Relation::Overlap {
-                continue;
-            }
-            if levels[i] != levels[j] {
-                let (first, second) = (solids[i].name().to_owned(), solids[j].name().to_owned());
-                return Err(SlicingError::Axes { first, second });
-            }
-            let (from, to) = (group[j], group[i]);
-            group.iter_mut().filter(|g| **g == from).for_each(|g| *g = to);
-        }
-    }
-    let members = |g: &usize| all.iter().copied().filter(|i| group[*i] == *g).collect::<Vec<_>>();
-    Ok(all.iter().map(members).filter(|m| !m.is_empty()).collect())
-}
-
-/// Clusters by the place of their foremost shape.
-fn in_order(mut clusters: Vec<Vec<usize>>, ranks: &[usize]) -> Vec<Vec<usize>> {
-    clusters.sort_by_key(|c| c.iter().map(|i| ranks[*i]).min());
-    clusters
-}
-
 /// What shapes reach together, by their kind of planes.
 fn unions(levels: &[Levels], ranges: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let mut made: Vec<(Levels, [f64; 2])> = Vec::new();
@@ -398,10 +328,9 @@ fn check(solid: &Solid, slabs: &Slabs, [low, high]: [f64; 2]) -> Result<(), Slic
     }
     let count = (high - low) / slabs.step;
     let farthest = (low - slabs.anchor).abs().max((high - slabs.anchor).abs()) / slabs.step;
-    // The negations also refuse what is no number.
-    let too_many = if !(count <= MOST_PLANES) {
+    let too_many = if count.is_nan() || count > MOST_PLANES {
         Some((count, MOST_PLANES))
-    } else if !(farthest <= HIGHEST) {
+    } else if farthest.is_nan() || farthest > HIGHEST {
         Some((farthest, HIGHEST))
     } else {
         None

@@ -5,9 +5,7 @@ use std::sync::Arc;
 use glam::{DAffine3, DMat3, DVec3};
 
 use crate::{
-    Aabb, ActionError, Attribute, Clip, ParameterValue, Tessellation,
-    geometry::ClipRegion,
-    resolve::ResolvedShape,
+    Aabb, ActionError, Attribute, Clip, ParameterValue, Tessellation, geometry::ClipRegion, resolve::ResolvedShape,
 };
 
 /// Voxels along the diagonal of a shape without any.
@@ -50,13 +48,14 @@ impl Solid {
         if state.geometry.as_surface().is_some() {
             return Ok(None);
         }
-        let body = match shape.block() {
-            Some(block) if block.min.cmplt(block.max).all() => Body::Block(block),
-            Some(_) => return Ok(None),
-            None => match earlier.filter(|e| e.id == shape.id && e.geometry_version == state.geometry_version) {
-                Some(same) => same.body.clone(),
-                None => Body::Cells(Arc::new(tessellate(shape)?)),
-            },
+        let attributes = attributes(shape);
+        let kept = earlier.filter(|e| e.id == shape.id && e.geometry_version == state.geometry_version);
+        // A block that carries numbers at its corners is cut as cells, like a mesh.
+        let body = match (shape.block().filter(|_| attributes.is_empty()), kept.map(|e| &e.body)) {
+            (Some(block), _) if block.min.cmplt(block.max).all() => Body::Block(block),
+            (Some(_), _) => return Ok(None),
+            (None, Some(Body::Cells(made))) => Body::Cells(Arc::clone(made)),
+            (None, _) => Body::Cells(Arc::new(tessellate(shape)?)),
         };
         let own_coordinates = match &body {
             Body::Cells(made) if made.tetrahedra.is_empty() => return Ok(None),
@@ -81,7 +80,7 @@ impl Solid {
             clip: state.clip.clone(),
             to_texture: DAffine3::from_scale(1.0 / nonzero(roi.size())) * DAffine3::from_translation(-roi.min),
             to_voxels: whole_rank(to_voxels, &state.transform, bounds),
-            attributes: attributes(shape),
+            attributes,
             body,
         }))
     }

@@ -221,7 +221,7 @@ impl Slice<'_> {
                 let normal = self.part.levels.gradient(block.world()[0]);
                 let push = |object, world| {
                     let texture = solid.texture(object);
-                    out.push_vertex([world, object, texture], |numbers| numbers.fill(f64::NAN));
+                    out.push_vertex([world, object, texture], |_| ());
                 };
                 block.cut(self.level(), normal, push);
                 out.close(0, None, normal, &clip);
