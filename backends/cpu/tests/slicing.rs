@@ -49,7 +49,7 @@ fn block() -> Shape {
 fn medium(texture: &VolumeTexture, solid: &Solid, point: DVec3) -> ([f64; 3], f64) {
     let index = texture.object_to_index().transform_point3(solid.to_object().transform_point3(point));
     let value = texture.sample(index, 0);
-    let [r, g, b, a] = table().lookup(value);
+    let [r, g, b, a] = table().resolve([0.0, 1.0]).classify(value);
     ([r, g, b], -(-a).ln_1p() / UNIT)
 }
 
