@@ -1,0 +1,152 @@
+// Rays, and where they are inside shapes.
+//
+// Constants given before: SHAPES, how many; DEEP, how many of them are composited in depth: the first,
+// and TRACKS, that or 1;
+// SPANS, the stretches that clips may leave of a ray; ALONE, whether there is just one, which absorbs.
+//
+// Rows of shape i, from 8i: 0 the anchor in local space, unit distance; 1 to 3 local space to
+// the block as a unit cube; 4 first row of its clip regions, how many, how it is composited, its
+// flags; 5 first row of the values it crosses, how many, first row of its planes, how many.
+// A region: how many planes, and whether its inside is kept; then its planes, normal and offset.
+
+const VOLACT_FIRST: u32 = 1u;
+const VOLACT_MAXIMUM: u32 = 2u;
+const VOLACT_MINIMUM: u32 = 3u;
+const VOLACT_AVERAGE: u32 = 4u;
+const VOLACT_ADD: u32 = 5u;
+// Flags: the shape's inside is drawn; its planes are opaque.
+const VOLACT_INSIDE: u32 = 1u;
+const VOLACT_OPAQUE: u32 = 2u;
+
+struct VolactRay {
+    // Its place at t = 0, from the anchor.
+    start: vec3<f32>,
+    direction: vec3<f32>,
+    begin: f32,
+    end: f32,
+}
+
+struct VolactSpans {
+    count: u32,
+    ends: array<vec2<f32>, SPANS>,
+}
+
+// The ray through a pixel's centre. In perspective the anchor ray has the direction q of length 1, and
+// that of another is (q + e)/|q + e|. Its difference to q, times the anchor's distance, is where the
+// ray is at t = 0: computed as a difference it keeps its digits however far the eye is away.
+fn volact_ray(pixel: vec2<u32>) -> VolactRay {
+    let at = vec2<f32>(pixel) + 0.5 - volact_frame.anchor;
+    let e = at.x * volact_frame.dx + at.y * volact_frame.dy;
+    var ray = VolactRay(e, volact_frame.toward, 0.0, 0.0);
+    if volact_frame.perspective != 0.0 {
+        let more = 2.0 * dot(volact_frame.toward, e) + dot(e, e);
+        let size = sqrt(1.0 + more);
+        let change = e / size - volact_frame.toward * (more / (size * (1.0 + size)));
+        ray.start = volact_frame.start * change;
+        ray.direction = volact_frame.toward + change;
+    }
+    let slope = dot(volact_frame.axis, ray.direction);
+    let place = dot(volact_frame.axis, ray.start);
+    ray.begin = max((volact_frame.near - place) / slope, volact_frame.first);
+    ray.end = (volact_frame.far - place) / slope;
+    return ray;
+}
+
+// Where segment k of the lattice begins.
+fn volact_border(k: i32) -> f32 { return fma(f32(k), volact_frame.step, f32(k) * volact_frame.step_rest); }
+
+fn volact_first_segment(t: f32) -> i32 { return i32(floor(t / volact_frame.step)); }
+
+// The stretch inside the shape's block: no length where there is none.
+fn volact_block(shape: u32, ray: VolactRay) -> vec2<f32> {
+    let p = vec4<f32>(volact_floats(8u * shape).xyz + ray.start, 1.0);
+    var span = vec2<f32>(ray.begin, ray.end);
+    for (var a = 1u; a <= 3u; a += 1u) {
+        let row = volact_floats(8u * shape + a);
+        let place = dot(row, p);
+        let slope = dot(row.xyz, ray.direction);
+        if slope == 0.0 {
+            if place < 0.0 || place > 1.0 { return vec2<f32>(0.0); }
+        } else {
+            let low = -place / slope;
+            let high = (1.0 - place) / slope;
+            span = vec2<f32>(max(span.x, min(low, high)), min(span.y, max(low, high)));
+        }
+    }
+    return span;
+}
+
+// The stretch inside a region of planes.
+fn volact_region(shape: u32, ray: VolactRay, row: u32) -> vec2<f32> {
+    let p = volact_floats(8u * shape).xyz + ray.start;
+    var span = vec2<f32>(-3.0e38, 3.0e38);
+    let planes = volact_numbers[row].x;
+    for (var n = 1u; n <= planes; n += 1u) {
+        let plane = volact_floats(row + n);
+        let slope = dot(plane.xyz, ray.direction);
+        let distance = dot(plane.xyz, p) - plane.w;
+        if slope == 0.0 {
+            if distance < 0.0 { return vec2<f32>(0.0); }
+        } else if slope > 0.0 {
+            span.x = max(span.x, -distance / slope);
+        } else {
+            span.y = min(span.y, -distance / slope);
+        }
+    }
+    return span;
+}
+
+// What the clips leave of a ray inside a shape, in order.
+fn volact_spans(shape: u32, ray: VolactRay) -> VolactSpans {
+    var spans: VolactSpans;
+    spans.ends[0] = volact_block(shape, ray);
+    if spans.ends[0].x >= spans.ends[0].y { return spans; }
+    spans.count = 1u;
+    var row = volact_numbers[8u * shape + 4u].x;
+    let regions = volact_numbers[8u * shape + 4u].y;
+    for (var n = 0u; n < regions; n += 1u) {
+        let inside = volact_region(shape, ray, row);
+        let keeps = volact_numbers[row].y != 0u;
+        row += 1u + volact_numbers[row].x;
+        if keeps {
+            spans = volact_kept(spans, inside);
+        } else if inside.x < inside.y {
+            spans = volact_cut(spans, inside);
+        }
+    }
+    return spans;
+}
+
+fn volact_kept(old: VolactSpans, inside: vec2<f32>) -> VolactSpans {
+    var made: VolactSpans;
+    for (var i = 0u; i < old.count; i += 1u) {
+        let left = vec2<f32>(max(old.ends[i].x, inside.x), min(old.ends[i].y, inside.y));
+        if left.x < left.y {
+            made.ends[made.count] = left;
+            made.count += 1u;
+        }
+    }
+    return made;
+}
+
+fn volact_cut(old: VolactSpans, inside: vec2<f32>) -> VolactSpans {
+    var made: VolactSpans;
+    for (var i = 0u; i < old.count; i += 1u) {
+        let before = vec2<f32>(old.ends[i].x, min(old.ends[i].y, inside.x));
+        let after = vec2<f32>(max(old.ends[i].x, inside.y), old.ends[i].y);
+        if before.x < before.y {
+            made.ends[made.count] = before;
+            made.count += 1u;
+        }
+        if after.x < after.y && made.count < SPANS {
+            made.ends[made.count] = after;
+            made.count += 1u;
+        }
+    }
+    return made;
+}
+
+fn volact_sample(shape: u32, ray: VolactRay, t: f32, step: f32, value: f32) -> Sample {
+    let p = volact_floats(8u * shape).xyz + (ray.start + t * ray.direction);
+    return Sample(p, ray.direction, step, -ray.direction, t + volact_frame.depth_shift, value);
+}
