@@ -2,13 +2,14 @@
 
 use std::sync::Arc;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::{
     Body, Levels, Order, PixelMap, Sampling, SamplingSpace, Slabs, SlicingError, Solid, Step, Sweep,
     block::{BlockCorners, facets},
     cells::{Cells, Run},
     choice::{clusters, in_order, levels},
+    hull::hull,
     order::{Sight, Solidly, ranks},
 };
 use crate::{Clip, FrameDesc, LinearRays, Plane, geometry::ClipRegion};
@@ -253,9 +254,34 @@ impl<'a> Slicing<'a> {
         Sweep::new(self, order)
     }
 
+    /// Writes what a block's part between two levels covers: as [`Slice::hull`](super::Slice::hull), for
+    /// more than one slab.
+    ///
+    /// # Panics
+    /// If there is no such shape.
+    pub fn cover(&self, shape: usize, levels: [f64; 2], out: &mut Vec<DVec2>) {
+        out.clear();
+        let mut corners = Vec::new();
+        self.parts[shape].cover(&self.map, levels, &mut corners, out);
+    }
+
     /// Whether slabs are counted from an eye, so that those of negative level lie on its other side.
     pub(super) fn has_eye(&self) -> bool {
         self.perspective
+    }
+}
+
+impl Part<'_> {
+    /// Writes the hull of a block's part between two levels; nothing for meshes.
+    pub fn cover(&self, map: &PixelMap, levels: [f64; 2], corners: &mut Vec<DVec3>, out: &mut Vec<DVec2>) {
+        out.clear();
+        match &self.shape {
+            Form::Block(block) => block.between(levels, corners),
+            // Along the view axis the points of a shell are at most as far away as on the ray.
+            Form::Shelled(block, _) => block.between([levels[0] * map.least_cosine(), levels[1]], corners),
+            Form::Cells(_) => return,
+        }
+        hull(map, corners, out);
     }
 }
 

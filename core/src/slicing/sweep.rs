@@ -8,9 +8,8 @@ use std::{
 use glam::{DVec2, DVec3};
 
 use super::{
-    Levels, PixelMap, Polygons, Slicing,
+    Levels, Polygons, Slicing,
     cells::Active,
-    hull::hull,
     plan::{Form, Part},
     polygon::Clips,
 };
@@ -191,17 +190,7 @@ impl Slice<'_> {
     /// [`MARGIN`](super::MARGIN), and clipped to one pixel around the viewport; nothing for meshes. Fragments
     /// cut their own segments, which may be empty.
     pub fn hull(&mut self, out: &mut Vec<DVec2>) {
-        out.clear();
-        let map: &PixelMap = &self.slicing.map;
-        match &self.part.shape {
-            Form::Block(block) => block.between(self.slab, self.corners),
-            // Along the view axis the points of a shell are at most as far away as on the ray.
-            Form::Shelled(block, _) => {
-                block.between([self.slab[0] * map.least_cosine(), self.slab[1]], self.corners);
-            }
-            Form::Cells(_) => return,
-        }
-        hull(map, self.corners, out);
+        self.part.cover(&self.slicing.map, self.slab, self.corners, out);
     }
 
     /// Writes the polygons in which the slab's middle surface cuts the shape, clipped by the volume's

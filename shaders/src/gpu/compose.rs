@@ -36,6 +36,13 @@ const RAYS: [&str; 6] = [
     include_str!("../../wgsl/gpu/picture.wgsl"),
 ];
 
+/// The parts of the stage that draws slabs.
+const SLICES: [&str; 3] = [
+    include_str!("../../wgsl/gpu/rays.wgsl"),
+    include_str!("../../wgsl/gpu/light.wgsl"),
+    include_str!("../../wgsl/gpu/slices.wgsl"),
+];
+
 /// A module ready for a device.
 #[derive(Debug)]
 pub struct Composition {
@@ -54,6 +61,19 @@ pub struct Composition {
 /// # Errors
 /// If something cannot be put together, which would be a fault of this crate.
 pub fn compose(recipes: &[Recipe], spans: u32, planes: bool) -> Result<Composition, ComposeError> {
+    stage(recipes, spans, planes, &RAYS)
+}
+
+/// Composes the stages that draw slabs of shapes, all of which are composited in depth: a vertex stage
+/// `volact_corner` and a fragment stage `volact_run`. `spans` as for [`compose`].
+///
+/// # Errors
+/// As [`compose`].
+pub fn compose_slices(recipes: &[Recipe], spans: u32) -> Result<Composition, ComposeError> {
+    stage(recipes, spans, false, &SLICES)
+}
+
+fn stage(recipes: &[Recipe], spans: u32, planes: bool, texts: &[&str]) -> Result<Composition, ComposeError> {
     let layout = Layout::new(recipes);
     let library = parse("", &[])?;
     let mut merger = Merger::default();
@@ -67,7 +87,7 @@ pub fn compose(recipes: &[Recipe], spans: u32, planes: bool) -> Result<Compositi
         recipes.len(),
         deep.max(1),
     );
-    let stage = parse(&constants, &[&[HOOKS], &RAYS[..]].concat())?;
+    let stage = parse(&constants, &[&[HOOKS], texts].concat())?;
     let mut import = Import::new(&stage, "");
     let mut shapes = Vec::new();
     for (number, recipe) in recipes.iter().enumerate() {

@@ -23,7 +23,7 @@ pub mod pack;
 pub mod table;
 pub mod voxels;
 
-pub use compose::{Composition, compose};
+pub use compose::{Composition, compose, compose_slices};
 pub use frame::{Anchor, FrameNumbers};
 pub use layout::{Layout, Recipe, Slot, VolumeUse, is_deep};
 
