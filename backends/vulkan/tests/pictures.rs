@@ -212,7 +212,7 @@ fn pictures_repeat_and_only_changes_are_moved() {
 fn what_is_not_drawn_is_refused_by_name() {
     let Some(mut action) = action(&[]) else { return };
     let volume = data(ScalarType::U8);
-    let sphere = Sphere::new(DVec3::ZERO, 1.0).unwrap();
+    let sphere = Sphere::new(DVec3::ZERO, 1.0, 12).unwrap();
     let lut = || Appearance::new("lut").with("lookup_table", table());
     let pre = table().pre_interpolated();
     assert_eq!(pre.interpolation(), TableInterpolation::Pre);
