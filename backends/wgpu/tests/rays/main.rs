@@ -1,0 +1,4 @@
+//! The action `wgpu`, casting rays: against closed forms and the reference on the same lattice.
+
+mod agreement;
+mod common;
