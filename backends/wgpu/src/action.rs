@@ -13,6 +13,7 @@ use crate::{
     device::{DeviceError, Gpu},
     draw::{Drawing, Item},
     method,
+    onto::Onto,
     options::{Settings, declaration},
     plan,
     programs::Programs,
@@ -56,7 +57,18 @@ impl WgpuAction {
     pub fn new(context: &Context, options: &Options) -> Result<Self, ActionError> {
         let settings = Settings::read(options);
         let gpu = Gpu::open(&settings.adapter)?;
-        Ok(Self {
+        Ok(Self::on(context, options, settings, gpu))
+    }
+
+    /// Makes one that shares the device of an application, from options that are checked and complete:
+    /// those that choose an adapter say nothing.
+    /// Its errors are caught by scopes, and its handlers left as they are.
+    pub fn with_device(context: &Context, options: &Options, device: wgpu::Device, queue: wgpu::Queue) -> Self {
+        Self::on(context, options, Settings::read(options), Gpu::of_application(device, queue))
+    }
+
+    fn on(context: &Context, options: &Options, settings: Settings, gpu: Gpu) -> Self {
+        Self {
             declaration: declaration(),
             given: options.clone(),
             settings,
@@ -66,7 +78,18 @@ impl WgpuAction {
             drawing: Drawing::default(),
             started: None,
             said: BTreeSet::new(),
-        })
+        }
+    }
+
+    /// In place of `end_draw`: draws what was recorded over a viewport of an application's target, in
+    /// front of what is there and, where its depth buffer is given, behind and around it. The target is
+    /// not cleared and depth is not written. The frame that comes back has no pixels of its own: its
+    /// colours are transparent and its depths infinite.
+    ///
+    /// # Errors
+    /// As `end_draw`, or if the target's format cannot be blended.
+    pub fn end_draw_onto(&mut self, target: &Onto<'_>) -> Result<Frame, ActionError> {
+        self.finish_scoped(Some(target))
     }
 
     fn prepare(&mut self, shapes: &[ResolvedShape], started: &mut Started) -> Result<(), ActionError> {
@@ -79,6 +102,63 @@ impl WgpuAction {
             plan::step(&shapes.iter().collect::<Vec<_>>(), &self.settings)?;
         }
         Ok(())
+    }
+
+    fn finish_scoped(&mut self, onto: Option<&Onto<'_>>) -> Result<Frame, ActionError> {
+        let scopes = self.gpu.scopes();
+        let made = self.finish(onto);
+        scopes.close(self.gpu.name())?;
+        made
+    }
+
+    /// Draws what was recorded, and reads it back where it is nobody's own.
+    fn finish(&mut self, onto: Option<&Onto<'_>>) -> Result<Frame, ActionError> {
+        let open = self.lifecycle.end()?;
+        let Some(Started { at, mut uploaded, mut rebuilt }) = self.started.take() else {
+            return Err(ActionError::NotDrawing { call: "end_draw" });
+        };
+        let drawn: Vec<&ResolvedShape> = open.drawn_shapes().collect();
+        let step = plan::step(&drawn, &self.settings)?;
+        let item = |shape| Ok(Item { shape, program: self.programs.of(shape)? });
+        let items = drawn.iter().copied().map(item).collect::<Result<Vec<_>, ActionError>>()?;
+        let how = (step, &self.settings, onto);
+        let submitted = self.drawing.submit(&self.gpu, &open.desc, items, how, &mut rebuilt)?;
+        uploaded += submitted.uploaded;
+        let prepare = at.elapsed();
+        let mut frame = Frame::empty(&open.desc);
+        let lost = || DeviceError::Failed { adapter: self.gpu.name().into(), why: "there is no picture".into() };
+        let target = self.drawing.target().ok_or_else(lost)?;
+        let resident = self.drawing.bytes() + target.bytes();
+        let counts = match onto {
+            Some(_) => target.wait(&self.gpu)?,
+            None => target.read(&self.gpu, &mut frame, &open.desc.viewport(), submitted.shift)?,
+        };
+        if let Some(number) = counts.overrun {
+            let shape = submitted.order.get(number).cloned().unwrap_or_default();
+            let shader = drawn.iter().find(|s| s.name == shape).map(|s| s.shader.declaration.name.clone());
+            let source = Box::new(Overrun { shader: shader.unwrap_or_default() });
+            return Err(ActionError::Shader { shape, source });
+        }
+        frame.warnings = drawn.iter().flat_map(|s| s.warnings.clone()).collect();
+        if counts.rays == 0 && !drawn.is_empty() {
+            let message = "no ray meets any shape; check camera, near and far, and transforms";
+            frame.warnings.push(Warning::new(WarningCode::NothingVisible, NAME, message));
+        }
+        frame.warnings.extend(method::adjusted(&drawn, &self.drawing.volumes, &self.settings));
+        self.emit(&frame);
+        frame.method = method::method(&drawn, &self.drawing.volumes, step, &self.settings, &self.gpu);
+        let stats = &mut frame.statistics;
+        (stats.rays, stats.samples) = (counts.rays, counts.samples);
+        (stats.prepare, stats.total) = (prepare, at.elapsed());
+        stats.render = stats.total - prepare;
+        stats.resident_bytes = resident;
+        (stats.uploaded_bytes, stats.rebuilt, stats.threads) = (uploaded, rebuilt, 1);
+        let megabytes = format!("{:.3} MB", self.drawing.volumes.bytes() as f64 * 1e-6);
+        stats.details.push(("textures".into(), megabytes));
+        if let Some(seconds) = counts.seconds {
+            stats.details.push(("GPU time".into(), format!("{:.3} ms", seconds * 1e3)));
+        }
+        Ok(frame)
     }
 
     fn emit(&mut self, frame: &Frame) {
@@ -115,7 +195,9 @@ impl RenderAction for WgpuAction {
         let programs = &self.programs;
         let open = self.lifecycle.begin(frame, |shape| check(shape, &programs.of(shape)?))?;
         let shapes: Vec<ResolvedShape> = open.shapes.values().cloned().collect();
-        if let Err(error) = self.prepare(&shapes, &mut started) {
+        let scopes = self.gpu.scopes();
+        let prepared = self.prepare(&shapes, &mut started);
+        if let Err(error) = scopes.close(self.gpu.name()).map_err(ActionError::from).and(prepared) {
             self.lifecycle.abandon();
             return Err(error);
         }
@@ -128,49 +210,7 @@ impl RenderAction for WgpuAction {
     }
 
     fn end_draw(&mut self) -> Result<Frame, ActionError> {
-        let open = self.lifecycle.end()?;
-        let Some(Started { at, mut uploaded, mut rebuilt }) = self.started.take() else {
-            return Err(ActionError::NotDrawing { call: "end_draw" });
-        };
-        let drawn: Vec<&ResolvedShape> = open.drawn_shapes().collect();
-        let step = plan::step(&drawn, &self.settings)?;
-        let item = |shape| Ok(Item { shape, program: self.programs.of(shape)? });
-        let items = drawn.iter().copied().map(item).collect::<Result<Vec<_>, ActionError>>()?;
-        let how = (step, &self.settings);
-        let submitted = self.drawing.submit(&self.gpu, &open.desc, items, how, &mut rebuilt)?;
-        uploaded += submitted.uploaded;
-        let prepare = at.elapsed();
-        let mut frame = Frame::empty(&open.desc);
-        let lost = || DeviceError::Failed { adapter: self.gpu.name().into(), why: "there is no picture".into() };
-        let target = self.drawing.target().ok_or_else(lost)?;
-        let resident = self.drawing.bytes() + target.bytes();
-        let counts = target.read(&self.gpu, &mut frame, &open.desc.viewport(), submitted.shift)?;
-        if let Some(number) = counts.overrun {
-            let shape = submitted.order.get(number).cloned().unwrap_or_default();
-            let shader = drawn.iter().find(|s| s.name == shape).map(|s| s.shader.declaration.name.clone());
-            let source = Box::new(Overrun { shader: shader.unwrap_or_default() });
-            return Err(ActionError::Shader { shape, source });
-        }
-        frame.warnings = drawn.iter().flat_map(|s| s.warnings.clone()).collect();
-        if counts.rays == 0 && !drawn.is_empty() {
-            let message = "no ray meets any shape; check camera, near and far, and transforms";
-            frame.warnings.push(Warning::new(WarningCode::NothingVisible, NAME, message));
-        }
-        frame.warnings.extend(method::adjusted(&drawn, &self.drawing.volumes, &self.settings));
-        self.emit(&frame);
-        frame.method = method::method(&drawn, &self.drawing.volumes, step, &self.settings, &self.gpu);
-        let stats = &mut frame.statistics;
-        (stats.rays, stats.samples) = (counts.rays, counts.samples);
-        (stats.prepare, stats.total) = (prepare, at.elapsed());
-        stats.render = stats.total - prepare;
-        stats.resident_bytes = resident;
-        (stats.uploaded_bytes, stats.rebuilt, stats.threads) = (uploaded, rebuilt, 1);
-        let megabytes = format!("{:.3} MB", self.drawing.volumes.bytes() as f64 * 1e-6);
-        stats.details.push(("textures".into(), megabytes));
-        if let Some(seconds) = counts.seconds {
-            stats.details.push(("GPU time".into(), format!("{:.3} ms", seconds * 1e3)));
-        }
-        Ok(frame)
+        self.finish_scoped(None)
     }
 
     fn set_option(&mut self, name: &str, value: ParameterValue) -> Result<(), ActionError> {

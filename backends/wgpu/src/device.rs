@@ -70,6 +70,8 @@ pub struct Gpu {
     name: String,
     description: String,
     failed: Arc<Mutex<Option<DeviceError>>>,
+    /// Whether it is an application's.
+    shared: bool,
 }
 
 /// How the description of a device begins that stands for a GPU and is none.
@@ -101,35 +103,39 @@ impl Gpu {
         Ok(Self::new(device, queue))
     }
 
-    /// A device that is there already: an application's.
-    pub fn new(device: wgpu::Device, queue: wgpu::Queue) -> Self {
-        let info = device.adapter_info();
-        let (name, failed) = (info.name.clone(), Arc::new(Mutex::new(None)));
-        let software = if info.device_type == wgpu::DeviceType::Cpu { SOFTWARE } else { "" };
-        let wgpu::AdapterInfo { backend, driver, driver_info, .. } = &info;
-        let description = format!("{software}{name} ({backend:?}, {driver} {driver_info})");
-        let (limits, features) = (device.limits(), device.features());
-        log::info!("wgpu: {description}");
+    fn new(device: wgpu::Device, queue: wgpu::Queue) -> Self {
+        let made = Self { shared: false, ..Self::of_application(device, queue) };
         let keep = |failed: &Arc<Mutex<Option<DeviceError>>>, error| {
             log::error!("wgpu: {error}");
             failed.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
         };
-        let (adapter, place) = (name.clone(), Arc::clone(&failed));
-        device.on_uncaptured_error(Arc::new(move |error| {
-            let adapter = adapter.clone();
-            let error = match error {
-                wgpu::Error::OutOfMemory { .. } => DeviceError::OutOfMemory { adapter },
-                other => DeviceError::Failed { adapter, why: other.to_string() },
-            };
-            keep(&place, error);
-        }));
-        let (adapter, place) = (name.clone(), Arc::clone(&failed));
-        device.set_device_lost_callback(move |reason, why| {
+        let (adapter, place) = (made.name.clone(), Arc::clone(&made.failed));
+        made.device.on_uncaptured_error(Arc::new(move |error| keep(&place, told(&adapter, error))));
+        let (adapter, place) = (made.name.clone(), Arc::clone(&made.failed));
+        made.device.set_device_lost_callback(move |reason, why| {
             if reason != wgpu::DeviceLostReason::Destroyed {
                 keep(&place, DeviceError::Lost { adapter: adapter.clone(), why });
             }
         });
-        Self { device, queue, limits, features, name, description, failed }
+        made
+    }
+
+    /// A device that an application has made, whose handlers of errors are left as they are.
+    pub fn of_application(device: wgpu::Device, queue: wgpu::Queue) -> Self {
+        let wgpu::AdapterInfo { name, backend, driver, driver_info, device_type, .. } = device.adapter_info();
+        let software = if device_type == wgpu::DeviceType::Cpu { SOFTWARE } else { "" };
+        let description = format!("{software}{name} ({backend:?}, {driver} {driver_info})");
+        let (limits, features) = (device.limits(), device.features());
+        log::info!("wgpu: {description}");
+        let failed = Arc::new(Mutex::new(None));
+        Self { device, queue, limits, features, name, description, failed, shared: true }
+    }
+
+    /// Catches errors of an application's device until they are closed.
+    pub fn scopes(&self) -> Scopes {
+        use wgpu::ErrorFilter as F;
+        let filters = if self.shared { vec![F::OutOfMemory, F::Validation, F::Internal] } else { Vec::new() };
+        Scopes(filters.into_iter().map(|filter| self.device.push_error_scope(filter)).collect())
     }
 
     /// The first failure since this was asked last. A lost device stays lost.
@@ -156,6 +162,32 @@ impl Gpu {
     /// Whether it has a feature.
     pub fn has(&self, feature: wgpu::Features) -> bool {
         self.features.contains(feature)
+    }
+}
+
+/// Errors that are caught.
+pub struct Scopes(Vec<wgpu::ErrorScopeGuard>);
+
+impl Scopes {
+    /// The first error since they were opened, if there was one.
+    ///
+    /// # Errors
+    /// That.
+    pub fn close(mut self, adapter: &str) -> Result<(), DeviceError> {
+        let mut first = None;
+        while let Some(scope) = self.0.pop() {
+            let error = pollster::block_on(scope.pop());
+            first = first.or(error.map(|error| told(adapter, error)));
+        }
+        first.map_or(Ok(()), Err)
+    }
+}
+
+fn told(adapter: &str, error: wgpu::Error) -> DeviceError {
+    let adapter = adapter.to_owned();
+    match error {
+        wgpu::Error::OutOfMemory { .. } => DeviceError::OutOfMemory { adapter },
+        other => DeviceError::Failed { adapter, why: other.to_string() },
     }
 }
 

@@ -26,6 +26,7 @@ use crate::{
     options::Settings,
     pipeline::{Key, Pipeline, Pipelines},
     readback::Target,
+    onto::{Laying, Onto},
     resources::{Rows, Volumes, too_large},
     skip::Skipping,
 };
@@ -45,6 +46,7 @@ pub struct Drawing {
     limits: Rows,
     limited: Option<Limited>,
     skipping: Skipping,
+    laying: Laying,
     target: Option<Target>,
     targets: u64,
     sampler: Option<wgpu::Sampler>,
@@ -99,6 +101,7 @@ impl Default for Drawing {
             limits: storage("volact limits"),
             limited: None,
             skipping: Skipping::default(),
+            laying: Laying::default(),
             target: None,
             targets: 0,
             sampler: None,
@@ -117,7 +120,7 @@ impl Drawing {
         gpu: &Gpu,
         desc: &FrameDesc,
         mut items: Vec<Item<'_>>,
-        (step, settings): (f64, &Settings),
+        (step, settings, onto): (f64, &Settings, Option<&Onto<'_>>),
         rebuilt: &mut Vec<Rebuild>,
     ) -> Result<Drawn, ActionError> {
         // Those composited in depth come first, in an order that does not depend on that of drawing.
@@ -136,9 +139,13 @@ impl Drawing {
         let pairs: Vec<_> = items.iter().map(|i| (i.shape, &i.program)).collect();
         let cells = if settings.skipping { self.skipping.cells(&pairs) } else { vec![None; items.len()] };
         let mut uploaded = self.upload_shapes(gpu, desc, &items, (&recipes, &pipeline, &anchor, &cells))?;
-        uploaded += self.upload_limits(gpu, desc, &grid, &anchor)?;
+        let depth = onto.and_then(|onto| onto.depth);
+        match depth {
+            Some(_) => self.reserve_limits(gpu, &viewport)?,
+            None => uploaded += self.upload_limits(gpu, desc, &grid, &anchor)?,
+        }
         let numbers = FrameNumbers {
-            limited: u32::from(desc.opaque.is_some()),
+            limited: u32::from(desc.opaque.is_some() || depth.is_some()),
             threshold: desc.depth_threshold,
             termination: settings.termination as f32,
             ..anchor.numbers()
@@ -149,7 +156,7 @@ impl Drawing {
         self.skipping.buffer(gpu, &cells)?;
         self.find_empty(gpu, &items, &cells, &pipeline, rebuilt)?;
         self.bind(gpu, &items, &pipeline)?;
-        self.dispatch(gpu, &pipeline, &viewport)?;
+        self.dispatch(gpu, &pipeline, (&anchor, &viewport), onto)?;
         let order = items.iter().map(|i| i.shape.name.clone()).collect();
         Ok(Drawn { shift: anchor.t - anchor.depth_zero, uploaded, order })
     }
@@ -265,6 +272,12 @@ impl Drawing {
         self.limits.set(gpu, rows)
     }
 
+    /// Room for limits that the device finds itself.
+    fn reserve_limits(&mut self, gpu: &Gpu, viewport: &Viewport) -> Result<(), ActionError> {
+        self.limited = None;
+        self.limits.reserve(gpu, 2 * viewport.width * viewport.height)
+    }
+
     fn make_target(&mut self, gpu: &Gpu, viewport: &Viewport) -> Result<(), ActionError> {
         let count = viewport.width * viewport.height;
         if 16 * count as u64 > gpu.limits.max_storage_buffer_binding_size {
@@ -316,10 +329,20 @@ impl Drawing {
         Ok(())
     }
 
-    fn dispatch(&self, gpu: &Gpu, pipeline: &Pipeline, viewport: &Viewport) -> Result<(), ActionError> {
+    fn dispatch(
+        &mut self,
+        gpu: &Gpu,
+        pipeline: &Pipeline,
+        (anchor, viewport): (&Anchor, &Viewport),
+        onto: Option<&Onto<'_>>,
+    ) -> Result<(), ActionError> {
         let (Some(target), Some(bound)) = (&self.target, &self.bound) else { return Ok(()) };
+        let (Some(frame), Some(limits)) = (self.frame.buffer(), self.limits.buffer()) else { return Ok(()) };
         let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: None });
         encoder.clear_buffer(&target.flags, 0, None);
+        if let Some(depth) = onto.and_then(|onto| onto.depth) {
+            self.laying.limit(gpu, &mut encoder, (frame, limits), &depth, (anchor, viewport))?;
+        }
         {
             let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
                 label: Some("volact rays"),
@@ -330,10 +353,15 @@ impl Drawing {
             let groups = |n: usize| (n as u32).div_ceil(WORKGROUP);
             pass.dispatch_workgroups(groups(viewport.width), groups(viewport.height), 1);
         }
-        target.copy(&mut encoder, viewport.width * viewport.height);
+        match onto {
+            Some(onto) => {
+                self.laying.lay(gpu, &mut encoder, (frame, &target.pixels), onto, viewport)?;
+                target.copy(&mut encoder, 0);
+            }
+            None => target.copy(&mut encoder, viewport.width * viewport.height),
+        }
         gpu.queue.submit([encoder.finish()]);
-        gpu.check()?;
-        Ok(())
+        Ok(gpu.check()?)
     }
 }
 

@@ -26,6 +26,7 @@ mod check;
 pub mod device;
 pub mod draw;
 mod method;
+pub mod onto;
 mod options;
 pub mod pipeline;
 mod plan;
@@ -35,6 +36,7 @@ pub mod resources;
 mod skip;
 
 pub use action::WgpuAction;
+pub use onto::{Onto, OntoDepth};
 pub use options::declaration;
 
 use std::sync::Arc;

@@ -102,8 +102,10 @@ impl Target {
     /// Has everything copied to where it is read, for the first `count` pixels.
     pub fn copy(&self, encoder: &mut wgpu::CommandEncoder, count: usize) {
         let n = count as u64;
-        encoder.copy_buffer_to_buffer(&self.pixels, 0, &self.staging, 0, 16 * n);
-        encoder.copy_buffer_to_buffer(&self.depths, 0, &self.staging, 16 * n, 4 * n);
+        if n > 0 {
+            encoder.copy_buffer_to_buffer(&self.pixels, 0, &self.staging, 0, 16 * n);
+            encoder.copy_buffer_to_buffer(&self.depths, 0, &self.staging, 16 * n, 4 * n);
+        }
         let at = (20 * n).next_multiple_of(8);
         encoder.copy_buffer_to_buffer(&self.flags, 0, &self.staging, at, FLAG_BYTES);
         if let Some(timer) = &self.timer {
@@ -119,8 +121,33 @@ impl Target {
     /// # Errors
     /// If the device fails.
     pub fn read(&self, gpu: &Gpu, frame: &mut Frame, view: &Viewport, shift: f64) -> Result<Counts, DeviceError> {
-        let failed = |why: String| DeviceError::Failed { adapter: gpu.name().into(), why };
         let count = view.width * view.height;
+        self.mapped(gpu, count, |bytes| {
+            let colors: &[[f32; 4]] = bytemuck::cast_slice(&bytes[..16 * count]);
+            let depths: &[f32] = bytemuck::cast_slice(&bytes[16 * count..20 * count]);
+            let width = frame.width;
+            for y in 0..view.height {
+                let to = (view.y + y) * width + view.x..(view.y + y) * width + view.x + view.width;
+                let from = y * view.width..(y + 1) * view.width;
+                frame.color[to.clone()].copy_from_slice(&colors[from.clone()]);
+                for (to, from) in frame.depth[to].iter_mut().zip(&depths[from]) {
+                    *to = (f64::from(*from) + shift) as f32;
+                }
+            }
+        })
+    }
+
+    /// Waits for the device; the picture stays there.
+    ///
+    /// # Errors
+    /// If the device fails.
+    pub fn wait(&self, gpu: &Gpu) -> Result<Counts, DeviceError> {
+        self.mapped(gpu, 0, |_| {})
+    }
+
+    /// Waits, shows what was copied for so many pixels, and counts.
+    fn mapped(&self, gpu: &Gpu, count: usize, mut show: impl FnMut(&[u8])) -> Result<Counts, DeviceError> {
+        let failed = |why: String| DeviceError::Failed { adapter: gpu.name().into(), why };
         let slice = self.staging.slice(0..Self::staged(count));
         let (tell, told) = std::sync::mpsc::channel();
         slice.map_async(wgpu::MapMode::Read, move |result| _ = tell.send(result));
@@ -131,17 +158,7 @@ impl Target {
         mapped.map_err(|error| failed(error.to_string()))?;
         let bytes = slice.get_mapped_range().map_err(|error| failed(error.to_string()))?;
         let counts = self.counts(&bytes[(20 * count).next_multiple_of(8)..]);
-        let colors: &[[f32; 4]] = bytemuck::cast_slice(&bytes[..16 * count]);
-        let depths: &[f32] = bytemuck::cast_slice(&bytes[16 * count..20 * count]);
-        let width = frame.width;
-        for y in 0..view.height {
-            let to = (view.y + y) * width + view.x..(view.y + y) * width + view.x + view.width;
-            let from = y * view.width..(y + 1) * view.width;
-            frame.color[to.clone()].copy_from_slice(&colors[from.clone()]);
-            for (to, from) in frame.depth[to].iter_mut().zip(&depths[from]) {
-                *to = (f64::from(*from) + shift) as f32;
-            }
-        }
+        show(&bytes);
         drop(bytes);
         self.staging.unmap();
         Ok(counts)

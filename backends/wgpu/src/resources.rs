@@ -223,22 +223,7 @@ impl Rows {
     /// # Errors
     /// If there are more than the device can bind.
     pub fn set(&mut self, gpu: &Gpu, rows: Vec<Row>) -> Result<usize, ActionError> {
-        let wanted = size_of_val::<[Row]>(&rows).max(size_of::<Row>()) as u64;
-        if wanted > gpu.limits.max_storage_buffer_binding_size {
-            return Err(too_large(gpu, self.label, wanted));
-        }
-        if self.buffer.as_ref().is_none_or(|b| b.size() < wanted) {
-            let size = wanted.next_power_of_two().min(gpu.limits.max_storage_buffer_binding_size);
-            self.buffer = Some(gpu.device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some(self.label),
-                size,
-                usage: self.usage,
-                mapped_at_creation: false,
-            }));
-            self.generation += 1;
-            self.content.clear();
-            gpu.check()?;
-        }
+        self.make_room(gpu, rows.len())?;
         let Some(buffer) = &self.buffer else { return Ok(0) };
         let same = |(a, b): (&Row, &Row)| a == b;
         let start = rows.iter().zip(&self.content).take_while(|(a, b)| same((a, b))).count();
@@ -256,6 +241,35 @@ impl Rows {
         let moved = bytes.len();
         self.content = rows;
         Ok(moved)
+    }
+
+    /// Makes room for so many rows, which the device is to write itself.
+    ///
+    /// # Errors
+    /// If there are more than the device can bind.
+    pub fn reserve(&mut self, gpu: &Gpu, count: usize) -> Result<(), ActionError> {
+        self.content.clear();
+        self.make_room(gpu, count)
+    }
+
+    fn make_room(&mut self, gpu: &Gpu, count: usize) -> Result<(), ActionError> {
+        let wanted = (count.max(1) * size_of::<Row>()) as u64;
+        if wanted > gpu.limits.max_storage_buffer_binding_size {
+            return Err(too_large(gpu, self.label, wanted));
+        }
+        if self.buffer.as_ref().is_none_or(|b| b.size() < wanted) {
+            let size = wanted.next_power_of_two().min(gpu.limits.max_storage_buffer_binding_size);
+            self.buffer = Some(gpu.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(self.label),
+                size,
+                usage: self.usage,
+                mapped_at_creation: false,
+            }));
+            self.generation += 1;
+            self.content.clear();
+            gpu.check()?;
+        }
+        Ok(())
     }
 
     /// The buffer, once rows were set.

@@ -28,8 +28,10 @@ const ABSENT: &str = include_str!("../../wgsl/gpu/absent.wgsl");
 const TABLE: &str = include_str!("../../wgsl/gpu/table.wgsl");
 const NUMBER: &str = include_str!("../../wgsl/gpu/number.wgsl");
 const GIVEN: &str = include_str!("../../wgsl/gpu/given.wgsl");
+pub(super) const RAY: &str = include_str!("../../wgsl/gpu/ray.wgsl");
 /// The parts of the stage that casts rays.
-const RAYS: [&str; 6] = [
+const RAYS: [&str; 7] = [
+    RAY,
     include_str!("../../wgsl/gpu/rays.wgsl"),
     include_str!("../../wgsl/gpu/light.wgsl"),
     include_str!("../../wgsl/gpu/over.wgsl"),
@@ -86,11 +88,17 @@ pub fn compose(recipes: &[Recipe], spans: u32, planes: bool) -> Result<Compositi
         merger.module.entry_points.push(naga::EntryPoint { function, ..entry.clone() });
     }
     let module = merger.module;
-    let mut validator = Validator::new(ValidationFlags::all(), Capabilities::empty());
-    let info = validator
-        .validate(&module)
-        .map_err(|error| ComposeError::inner(format!("the module is not valid: {}", error.emit_to_string(""))))?;
+    let info = validate(&module)?;
     Ok(Composition { module, info, layout })
+}
+
+/// What naga's validator finds of a module.
+pub(super) fn validate(module: &Module) -> Result<ModuleInfo, ComposeError> {
+    let mut validator = Validator::new(ValidationFlags::all(), Capabilities::empty());
+    let wrong = |error: naga::WithSpan<naga::valid::ValidationError>| {
+        ComposeError::inner(format!("the module is not valid: {}", error.emit_to_string("")))
+    };
+    validator.validate(module).map_err(wrong)
 }
 
 /// Parses texts behind the library and constants.

@@ -6,7 +6,8 @@
 //! 3. [`compose`] imports the author's functions into one module under a prefix each, with real
 //!    functions in place of the stubs of parameters, and a budget for loops.
 //! 4. [`pack`] writes a shape's numbers into their rows, [`table`] a lookup table, [`voxels`] says how
-//!    voxels lie in a texture, [`skip`] where nothing can be seen.
+//!    voxels lie in a texture, [`skip`] where nothing can be seen,
+//!    [`onto`] how a picture is laid over an application's.
 //!
 //! # Bindings
 //! Group 0: 0 the frame ([`FrameNumbers`], uniform), 1 rows of numbers, 2 rows of tables, 3 what the
@@ -20,6 +21,7 @@ mod compose;
 mod frame;
 mod layout;
 mod merge;
+pub mod onto;
 pub mod pack;
 pub mod skip;
 pub mod table;

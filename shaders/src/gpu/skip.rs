@@ -1,9 +1,9 @@
 //! What of a shape can be skipped, and the module that finds it.
 
-use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
+use naga::valid::ModuleInfo;
 use volact_core::{VolumeTexture, resolve::ResolvedShape};
 
-use super::{ComposeError, compose::parse};
+use super::{ComposeError, compose::{parse, validate}};
 use crate::{Entry, Kernel, Program, eval::Uniforms, signatures::Derived};
 
 /// Samples of a cell along each axis.
@@ -69,8 +69,6 @@ pub fn transparent_with(shape: &ResolvedShape, program: &Program) -> Option<[usi
 /// Never: a test composes it.
 pub fn module() -> Result<(naga::Module, ModuleInfo), ComposeError> {
     let module = parse("", &[include_str!("../../wgsl/gpu/skip.wgsl")])?;
-    let mut validator = Validator::new(ValidationFlags::all(), Capabilities::empty());
-    let info = validator.validate(&module);
-    let info = info.map_err(|error| ComposeError::inner(format!("skipping: {}", error.emit_to_string(""))))?;
+    let info = validate(&module)?;
     Ok((module, info))
 }

@@ -2,3 +2,5 @@
 
 mod agreement;
 mod common;
+mod life;
+mod onto;
