@@ -23,10 +23,10 @@ use volact_shaders::{
 use crate::{
     check::{NAME, SPANS},
     device::Gpu,
+    onto::{Laying, Onto},
     options::Settings,
     pipeline::{Key, Pipeline, Pipelines},
     readback::Target,
-    onto::{Laying, Onto},
     resources::{Rows, Volumes, too_large},
     skip::Skipping,
 };

@@ -76,13 +76,9 @@ impl Laying {
             Some(made) => made,
             empty => empty.insert(limits_pipeline(gpu)?),
         };
-        let resources = vec![
-            uniform.as_entire_binding(),
-            wgpu::BindingResource::TextureView(depth.view),
-            rows.as_entire_binding(),
-        ];
-        let groups =
-            [group(gpu, &layouts[0], vec![frame.as_entire_binding()]), group(gpu, &layouts[1], resources)];
+        let resources =
+            vec![uniform.as_entire_binding(), wgpu::BindingResource::TextureView(depth.view), rows.as_entire_binding()];
+        let groups = [group(gpu, &layouts[0], vec![frame.as_entire_binding()]), group(gpu, &layouts[1], resources)];
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
         pass.set_pipeline(pipeline);
         groups.iter().zip(0..).for_each(|(group, i)| pass.set_bind_group(i, group, &[]));
@@ -113,8 +109,7 @@ impl Laying {
         }
         let Some((pipeline, layouts)) = self.covers.get(&target.format) else { return Ok(()) };
         let resources = vec![pixels.as_entire_binding(), uniform.as_entire_binding()];
-        let groups =
-            [group(gpu, &layouts[0], vec![frame.as_entire_binding()]), group(gpu, &layouts[1], resources)];
+        let groups = [group(gpu, &layouts[0], vec![frame.as_entire_binding()]), group(gpu, &layouts[1], resources)];
         let color = wgpu::RenderPassColorAttachment {
             view: target.view,
             depth_slice: None,

@@ -42,6 +42,7 @@ pub fn write(layout: &Layout, anchor: &Anchor, clip: &Clip, shapes: &[Shape<'_>]
         let origin = 0.5 * (origin.min + origin.max);
         shape.write_parameters(&mut rows, layout, origin);
         shape.write_place(&mut rows, anchor, clip, origin);
+        shape.write_cells(&mut rows, layout);
     }
     rows
 }

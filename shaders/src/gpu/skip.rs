@@ -3,7 +3,10 @@
 use naga::valid::ModuleInfo;
 use volact_core::{VolumeTexture, resolve::ResolvedShape};
 
-use super::{ComposeError, compose::{parse, validate}};
+use super::{
+    ComposeError,
+    compose::{parse, validate},
+};
 use crate::{Entry, Kernel, Program, eval::Uniforms, signatures::Derived};
 
 /// Samples of a cell along each axis.

@@ -98,7 +98,12 @@ fn action(application: &Application) -> WgpuAction {
     let given = ParameterMap::from([("sample_distance".to_owned(), 0.3.into())]);
     let options = volact_wgpu::declaration().resolve(&given, |_| false).unwrap();
     let (device, queue) = (application.device.clone(), application.queue.clone());
-    WgpuAction::with_device(&Context { shaders: crate::common::registry().shaders().clone(), ..Default::default() }, &options, device, queue)
+    WgpuAction::with_device(
+        &Context { shaders: crate::common::registry().shaders().clone(), ..Default::default() },
+        &options,
+        device,
+        queue,
+    )
 }
 
 fn shape() -> Shape {
@@ -123,7 +128,8 @@ fn begin(action: &mut WgpuAction, shape: &Shape, desc: &FrameDesc) {
 fn over(frame: &Frame, inside: Viewport) -> Vec<[f64; 4]> {
     let pixel = |i: usize| {
         let (x, y) = (i % frame.width, i / frame.width);
-        let seen = (inside.x..inside.x + inside.width).contains(&x) && (inside.y..inside.y + inside.height).contains(&y);
+        let seen =
+            (inside.x..inside.x + inside.width).contains(&x) && (inside.y..inside.y + inside.height).contains(&y);
         let color = if seen { frame.color[i].map(f64::from) } else { [0.0; 4] };
         [0, 1, 2, 3].map(|c| 255.0 * (color[c] + (1.0 - color[3]) * BACK[c]))
     };
