@@ -4,7 +4,7 @@ use naga::back::spv;
 use volact_core::{ParameterType, ShaderEntry};
 use volact_shaders::{
     Program, builtin,
-    gpu::{Recipe, VolumeUse, compose},
+    gpu::{self, Recipe, VolumeUse, compose},
     load,
     signatures::kind_of,
 };
@@ -121,4 +121,12 @@ fn loops_of_authors_ask_for_their_budget() {
         called.count()
     };
     assert_eq!((asked("s0_spin"), asked("s0_shade")), (1, 2));
+}
+
+#[test]
+fn passes_around_the_march_are_valid() {
+    for (module, info) in [gpu::skip::module().unwrap(), gpu::onto::limits().unwrap(), gpu::onto::onto().unwrap()] {
+        let options = spv::Options { lang_version: (1, 3), ..spv::Options::default() };
+        assert!(!spv::write_vec(&module, &info, &options, None).unwrap().is_empty());
+    }
 }

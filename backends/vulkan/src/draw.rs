@@ -246,6 +246,7 @@ impl Drawing {
             number,
             units: &units[number],
             tables: &places[number],
+            cells: None,
         };
         let shapes: Vec<_> = (0..items.len()).map(shape).collect();
         let numbers = pack::write(layout, anchor, &desc.clip, &shapes);

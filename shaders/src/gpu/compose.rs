@@ -22,12 +22,16 @@ use crate::{
 const LIBRARY: &str = include_str!("../../wgsl/gpu/library.wgsl");
 const HOOKS: &str = include_str!("../../wgsl/gpu/hooks.wgsl");
 const VOLUME: &str = include_str!("../../wgsl/gpu/volume.wgsl");
+const EXACT: &str = include_str!("../../wgsl/gpu/exact.wgsl");
+const HARDWARE: &str = include_str!("../../wgsl/gpu/hardware.wgsl");
 const ABSENT: &str = include_str!("../../wgsl/gpu/absent.wgsl");
 const TABLE: &str = include_str!("../../wgsl/gpu/table.wgsl");
 const NUMBER: &str = include_str!("../../wgsl/gpu/number.wgsl");
 const GIVEN: &str = include_str!("../../wgsl/gpu/given.wgsl");
+pub(super) const RAY: &str = include_str!("../../wgsl/gpu/ray.wgsl");
 /// The parts of the stage that casts rays.
-const RAYS: [&str; 6] = [
+const RAYS: [&str; 7] = [
+    RAY,
     include_str!("../../wgsl/gpu/rays.wgsl"),
     include_str!("../../wgsl/gpu/light.wgsl"),
     include_str!("../../wgsl/gpu/over.wgsl"),
@@ -37,7 +41,8 @@ const RAYS: [&str; 6] = [
 ];
 
 /// The parts of the stage that draws slabs.
-const SLICES: [&str; 3] = [
+const SLICES: [&str; 4] = [
+    RAY,
     include_str!("../../wgsl/gpu/rays.wgsl"),
     include_str!("../../wgsl/gpu/light.wgsl"),
     include_str!("../../wgsl/gpu/slices.wgsl"),
@@ -104,15 +109,21 @@ fn stage(recipes: &[Recipe], spans: u32, planes: bool, texts: &[&str]) -> Result
         merger.module.entry_points.push(naga::EntryPoint { function, ..entry.clone() });
     }
     let module = merger.module;
-    let mut validator = Validator::new(ValidationFlags::all(), Capabilities::empty());
-    let info = validator
-        .validate(&module)
-        .map_err(|error| ComposeError::inner(format!("the module is not valid: {}", error.emit_to_string(""))))?;
+    let info = validate(&module)?;
     Ok(Composition { module, info, layout })
 }
 
+/// What naga's validator finds of a module.
+pub(super) fn validate(module: &Module) -> Result<ModuleInfo, ComposeError> {
+    let mut validator = Validator::new(ValidationFlags::all(), Capabilities::empty());
+    let wrong = |error: naga::WithSpan<naga::valid::ValidationError>| {
+        ComposeError::inner(format!("the module is not valid: {}", error.emit_to_string("")))
+    };
+    validator.validate(module).map_err(wrong)
+}
+
 /// Parses texts behind the library and constants.
-fn parse(constants: &str, texts: &[&str]) -> Result<Module, ComposeError> {
+pub(super) fn parse(constants: &str, texts: &[&str]) -> Result<Module, ComposeError> {
     let text = [constants, LIBRARY].into_iter().chain(texts.iter().copied()).collect::<Vec<_>>().join("\n");
     naga::front::wgsl::parse_str(&text)
         .map_err(|error| ComposeError::inner(format!("a text of the framework: {}", error.emit_to_string(&text))))
@@ -138,15 +149,16 @@ impl Shape {
         };
         let mut accessors = Vec::new();
         for (parameter, (slot, volume)) in parameters.iter().zip(slots.iter().zip(&recipe.volumes)) {
-            let (constants, text) = match kind_of(parameter) {
+            let (constants, texts) = match kind_of(parameter) {
                 Some(ParameterType::Volume) => match volume {
-                    Some(volume) => (reading(slot, volume), VOLUME),
-                    None => (String::new(), ABSENT),
+                    Some(volume) if volume.hardware => (reading(slot, volume), vec![VOLUME, HARDWARE]),
+                    Some(volume) => (reading(slot, volume), vec![VOLUME, EXACT]),
+                    None => (String::new(), vec![ABSENT]),
                 },
-                Some(ParameterType::Table) => (medium(slot.row), TABLE),
-                _ => (format!("const ROW: u32 = {}u;\n", slot.row), NUMBER),
+                Some(ParameterType::Table) => (medium(slot.row), vec![TABLE]),
+                _ => (format!("const ROW: u32 = {}u;\n", slot.row), vec![NUMBER]),
             };
-            accessors.push(parse(&constants, &[text])?);
+            accessors.push(parse(&constants, &texts)?);
             accessors.push(parse(&medium(slot.given), &[GIVEN])?);
         }
         accessors.push(parse(&medium(0), &[GIVEN])?);
@@ -181,11 +193,11 @@ impl Shape {
 
 /// The constants of a volume's text.
 fn reading(slot: &Slot, volume: &VolumeUse) -> String {
-    let VolumeUse { channels, nearest, hardware } = volume;
+    let VolumeUse { channels, nearest, .. } = volume;
     let texture = slot.texture.unwrap_or(1);
     format!(
         "const ROW: u32 = {}u;\nconst TEXTURE: u32 = {texture}u;\nconst CHANNELS: u32 = {channels}u;\n\
-         const NEAREST: bool = {nearest};\nconst HARDWARE: bool = {hardware};\n",
+         const NEAREST: bool = {nearest};\n",
         slot.row
     )
 }

@@ -6,12 +6,14 @@
 //! 3. [`compose`] imports the author's functions into one module under a prefix each, with real
 //!    functions in place of the stubs of parameters, and a budget for loops.
 //! 4. [`pack`] writes a shape's numbers into their rows, [`table`] a lookup table, [`voxels`] says how
-//!    voxels lie in a texture.
+//!    voxels lie in a texture, [`skip`] where nothing can be seen,
+//!    [`onto`] how a picture is laid over an application's.
 //!
 //! # Bindings
 //! Group 0: 0 the frame ([`FrameNumbers`], uniform), 1 rows of numbers, 2 rows of tables, 3 what the
 //! application has drawn, 4 pixels, 5 depths, 6 flags: the shape whose loop overran its budget, plus 1;
-//! then 64 counts of samples and 64 of rays. Group 1: 0 a sampler, then the volumes' textures.
+//! then 64 counts of samples and 64 of rays; 7 what can be skipped. Group 1: 0 a sampler, then the
+//! volumes' textures.
 //!
 //! All numbers are f32 in [local space](crate::signatures), the origin near the shape.
 
@@ -19,7 +21,9 @@ mod compose;
 mod frame;
 mod layout;
 mod merge;
+pub mod onto;
 pub mod pack;
+pub mod skip;
 pub mod table;
 pub mod voxels;
 

@@ -7,7 +7,7 @@ use volact_core::{
     volume::Components,
 };
 
-use super::{Anchor, Layout, Recipe, SHAPE_ROWS, voxels::Units};
+use super::{Anchor, Layout, Recipe, SHAPE_ROWS, skip::Cells, voxels::Units};
 use crate::{
     eval::{Function, Uniform, Uniforms},
     signatures::{Derived, kind_of},
@@ -29,6 +29,8 @@ pub struct Shape<'a> {
     pub units: &'a [Option<Units>],
     /// For each declared parameter where its table begins.
     pub tables: &'a [u32],
+    /// What can be skipped.
+    pub cells: Option<Cells>,
 }
 
 /// Writes shapes that are drawn with a layout from an anchor; what is longer for some than for others
@@ -40,6 +42,7 @@ pub fn write(layout: &Layout, anchor: &Anchor, clip: &Clip, shapes: &[Shape<'_>]
         let origin = 0.5 * (origin.min + origin.max);
         shape.write_parameters(&mut rows, layout, origin);
         shape.write_place(&mut rows, anchor, clip, origin);
+        shape.write_cells(&mut rows, layout);
     }
     rows
 }
@@ -194,6 +197,14 @@ impl Shape<'_> {
             rows.push(plane(normal / size, offset / size));
             rows[first + 5][3] += 1;
         }
+    }
+
+    fn write_cells(&self, rows: &mut [Row], layout: &Layout) {
+        let Some(cells) = self.cells else { return };
+        let first = self.number * SHAPE_ROWS as usize;
+        let [x, y, z] = cells.count;
+        rows[first + 6] = [cells.base, x, y, z];
+        rows[first + 7] = [layout.slots[self.number][cells.volume].row, 0, 0, 0];
     }
 
     /// The values whose crossings are seen, in rising order: those of the control points of the first

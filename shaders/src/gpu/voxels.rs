@@ -64,8 +64,8 @@ pub struct Encoding {
 enum Code {
     /// As they are.
     Same,
-    /// Signed whole numbers moved up by half of their range.
-    Lifted,
+    /// Signed whole numbers from their lowest on, so that small ones keep their digits in f32.
+    Lifted { lowest: i32 },
     /// The lowest and the highest that occur become 0 and 1.
     Spread { low: f64, width: f64 },
 }
@@ -80,15 +80,19 @@ impl Encoding {
             let units = Units { scale: steps * desc.slope, offset: lowest * desc.slope + desc.intercept };
             Self { texel, channels, units, code }
         };
+        let lifted = |texel, steps| {
+            let lowest = lowest(volume);
+            plain(texel, Code::Lifted { lowest }, steps, f64::from(lowest))
+        };
         let chosen = match wanted {
             Wanted::Exact => native,
             Wanted::Texel(texel) => native.filter(|n| *n == texel),
         };
         match (chosen, desc.scalar) {
             (Some(texel), ScalarType::U8) => plain(texel, Code::Same, 255.0, 0.0),
-            (Some(texel), ScalarType::I8) => plain(texel, Code::Lifted, 255.0, -128.0),
+            (Some(texel), ScalarType::I8) => lifted(texel, 255.0),
             (Some(texel), ScalarType::U16) => plain(texel, Code::Same, 65535.0, 0.0),
-            (Some(texel), ScalarType::I16) => plain(texel, Code::Lifted, 65535.0, -32768.0),
+            (Some(texel), ScalarType::I16) => lifted(texel, 65535.0),
             (Some(texel), _) => plain(texel, Code::Same, 1.0, 0.0),
             (None, _) => {
                 let texel = match wanted {
@@ -147,10 +151,12 @@ impl Encoding {
         let own = &sample[c * size..(c + 1) * size];
         match self.code {
             Code::Same => made.extend_from_slice(own),
-            // The sign bit is the highest of the number's bytes.
-            Code::Lifted => {
-                let sign = if cfg!(target_endian = "big") { 0 } else { size - 1 };
-                made.extend(own.iter().enumerate().map(|(i, b)| if i == sign { b ^ 0x80 } else { *b }));
+            Code::Lifted { lowest } => {
+                let number = desc.scalar.read(sample, c) as i32 - lowest;
+                match self.texel {
+                    Texel::Unorm8 => made.push(number as u8),
+                    _ => made.extend_from_slice(&(number as u16).to_ne_bytes()),
+                }
             }
             Code::Spread { low, width } => {
                 let value = desc.scalar.read(sample, c) * desc.slope + desc.intercept;
@@ -166,6 +172,14 @@ impl Encoding {
             }
         }
     }
+}
+
+/// The lowest stored number of a signed type.
+fn lowest(volume: &Volume) -> i32 {
+    let desc = volume.desc();
+    let Some([a, b]) = volume.value_range() else { return 0 };
+    let stored = [a, b].map(|v| ((v - desc.intercept) / desc.slope).round());
+    stored[0].min(stored[1]) as i32
 }
 
 /// The texel that holds a volume's stored numbers to the bit.

@@ -47,4 +47,7 @@ fn volact_premultiplied(m: Medium) -> vec4<f32> {
     return vec4<f32>(m.color * a, a);
 }
 
-fn volact_is_done(k: i32) -> bool { return (k & 31) == 0 && volact_left < volact_frame.termination; }
+// Whether to stop, between two segments: at every 32nd border, whatever was skipped.
+fn volact_is_done(before: i32, k: i32) -> bool {
+    return (before >> 5u) != (k >> 5u) && volact_left < volact_frame.termination;
+}

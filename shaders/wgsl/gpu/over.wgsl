@@ -7,17 +7,29 @@ fn volact_over(shape: u32, ray: VolactRay) {
         let b = spans.ends[i].y;
         var k = volact_first_segment(a);
         var border = volact_border(k);
+        // Whether it is worth looking how far around everything is empty.
+        var look = true;
         while border < b {
             let t0 = max(border, a);
+            let from_k = k;
             k += 1;
             border = volact_border(k);
             let t1 = min(border, b);
             if t1 > t0 {
-                let m = volact_shade(shape, volact_sample(shape, ray, 0.5 * (t0 + t1), t1 - t0, 0.0));
-                volact_samples += 1u;
-                if volact_seen(m) { volact_through(m, t0, t1); }
+                let middle = 0.5 * (t0 + t1);
+                var ahead = middle;
+                if look { ahead = volact_ahead(shape, ray, middle); }
+                if ahead > middle {
+                    k = volact_beyond(k, ahead, b);
+                    border = volact_border(k);
+                } else {
+                    let m = volact_shade(shape, volact_sample(shape, ray, middle, t1 - t0, 0.0));
+                    volact_samples += 1u;
+                    look = !(m.extinction > 0.0);
+                    if volact_seen(m) { volact_through(m, t0, t1); }
+                }
             }
-            if volact_is_done(k) { return; }
+            if volact_is_done(from_k, k) { return; }
         }
     }
 }

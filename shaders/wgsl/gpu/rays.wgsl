@@ -1,4 +1,4 @@
-// Rays, and where they are inside shapes.
+// Where rays are inside shapes.
 //
 // Constants given before: SHAPES, how many; DEEP, how many of them are composited in depth: the first,
 // and TRACKS, that or 1;
@@ -6,7 +6,8 @@
 //
 // Rows of shape i, from 8i: 0 the anchor in local space, unit distance; 1 to 3 local space to
 // the block as a unit cube; 4 first row of its clip regions, how many, how it is composited, its
-// flags; 5 first row of the values it crosses, how many, first row of its planes, how many.
+// flags; 5 first row of the values it crosses, how many, first row of its planes, how many; 6 where its
+// cells begin, and how many there are along each axis; 7 first row of the volume that the cells are of.
 // A region: how many planes, and whether its inside is kept; then its planes, normal and offset.
 
 const VOLACT_FIRST: u32 = 1u;
@@ -18,38 +19,9 @@ const VOLACT_ADD: u32 = 5u;
 const VOLACT_INSIDE: u32 = 1u;
 const VOLACT_OPAQUE: u32 = 2u;
 
-struct VolactRay {
-    // Its place at t = 0, from the anchor.
-    start: vec3<f32>,
-    direction: vec3<f32>,
-    begin: f32,
-    end: f32,
-}
-
 struct VolactSpans {
     count: u32,
     ends: array<vec2<f32>, SPANS>,
-}
-
-// The ray through a pixel's centre. In perspective the anchor ray has the direction q of length 1, and
-// that of another is (q + e)/|q + e|. Its difference to q, times the anchor's distance, is where the
-// ray is at t = 0: computed as a difference it keeps its digits however far the eye is away.
-fn volact_ray(pixel: vec2<u32>) -> VolactRay {
-    let at = vec2<f32>(pixel) + 0.5 - volact_frame.anchor;
-    let e = at.x * volact_frame.dx + at.y * volact_frame.dy;
-    var ray = VolactRay(e, volact_frame.toward, 0.0, 0.0);
-    if volact_frame.perspective != 0.0 {
-        let more = 2.0 * dot(volact_frame.toward, e) + dot(e, e);
-        let size = sqrt(1.0 + more);
-        let change = e / size - volact_frame.toward * (more / (size * (1.0 + size)));
-        ray.start = volact_frame.start * change;
-        ray.direction = volact_frame.toward + change;
-    }
-    let slope = dot(volact_frame.axis, ray.direction);
-    let place = dot(volact_frame.axis, ray.start);
-    ray.begin = max((volact_frame.near - place) / slope, volact_frame.first);
-    ray.end = (volact_frame.far - place) / slope;
-    return ray;
 }
 
 // Where segment k of the lattice begins.
@@ -149,4 +121,34 @@ fn volact_cut(old: VolactSpans, inside: vec2<f32>) -> VolactSpans {
 fn volact_sample(shape: u32, ray: VolactRay, t: f32, step: f32, value: f32) -> Sample {
     let p = volact_floats(8u * shape).xyz + (ray.start + t * ray.direction);
     return Sample(p, ray.direction, step, -ray.direction, t + volact_frame.depth_shift, value);
+}
+
+// For cells of 8³ samples how many around them, with themselves, are empty; 0 where they are not.
+@group(0) @binding(7) var<storage, read> volact_empties: array<u32>;
+
+// Up to where nothing can be seen of a shape from a place on a ray on; the place itself where that is
+// not known.
+fn volact_ahead(shape: u32, ray: VolactRay, t: f32) -> f32 {
+    let grid = volact_numbers[8u * shape + 6u];
+    if grid.y == 0u { return t; }
+    let p = vec4<f32>(volact_floats(8u * shape).xyz + (ray.start + t * ray.direction), 1.0);
+    let row = volact_numbers[8u * shape + 7u].x;
+    let x = vec3<f32>(dot(volact_floats(row), p), dot(volact_floats(row + 1u), p), dot(volact_floats(row + 2u), p));
+    let cell = clamp(vec3<i32>(floor(x / 8.0)), vec3<i32>(0), vec3<i32>(grid.yzw) - 1);
+    let at = u32(cell.x) + grid.y * (u32(cell.y) + grid.z * u32(cell.z));
+    let free = i32(volact_empties[grid.x + at]);
+    if free == 0 { return t; }
+    var left = 3.0e38;
+    for (var a = 0u; a < 3u; a += 1u) {
+        let slope = dot(volact_floats(row + a).xyz, ray.direction);
+        let end = 8.0 * f32(select(cell[a] - free + 1, cell[a] + free, slope > 0.0));
+        if slope != 0.0 { left = min(left, (end - x[a]) / slope); }
+    }
+    return t + max(left, 0.0);
+}
+
+// The segment to go on with where nothing is seen up to some place: not the last of a stretch, which is
+// a piece of its own.
+fn volact_beyond(k: i32, ahead: f32, end: f32) -> i32 {
+    return max(k, volact_first_segment(min(ahead, end)));
 }

@@ -46,7 +46,7 @@ fn volact_slabs(run: vec3<i32>, rest: f32, ray: VolactRay, a: f32, b: f32) -> bo
             volact_samples += 1u;
             if volact_seen(m) { volact_through(m, t0, t1); }
         }
-        if volact_is_done(k) { return true; }
+        if volact_is_done(k - 1, k) { return true; }
     }
     return false;
 }

@@ -5,8 +5,10 @@
 struct VolactTrack {
     spans: VolactSpans,
     span: u32,
-    // The number of the next segment, and the piece at hand with its medium.
+    // The number of the next segment, of the one where the piece at hand begins, and that piece with
+    // its medium.
     k: i32,
+    first: i32,
     start: f32,
     end: f32,
     medium: Medium,
@@ -49,8 +51,19 @@ fn volact_forward(shape: u32, ray: VolactRay) {
             }
             continue;
         }
+        volact_tracks[shape].first = k;
         volact_tracks[shape].k = k + 1;
         if t1 > t0 {
+            let middle = 0.5 * (t0 + t1);
+            let ahead = volact_ahead(shape, ray, middle);
+            if ahead > middle {
+                let next = volact_beyond(k + 1, ahead, ends.y);
+                volact_tracks[shape].k = next;
+                volact_tracks[shape].start = t0;
+                volact_tracks[shape].end = min(volact_border(next), ends.y);
+                volact_tracks[shape].medium = Medium(vec3<f32>(0.0), 0.0);
+                return;
+            }
             volact_take(shape, ray, t0, t1, t0 == ends.x);
             return;
         }
@@ -252,10 +265,12 @@ fn volact_sweep(ray: VolactRay) {
         var surfaces = false;
         for (var shape = 0u; shape < DEEP; shape += 1u) {
             if volact_tracks[shape].end <= t {
+                let first = volact_tracks[shape].first;
                 let k = volact_tracks[shape].k;
+                // Where a stretch ends inside of a segment others go on.
+                if t >= volact_border(k) && volact_is_done(first, k) { return; }
                 volact_forward(shape, ray);
                 surfaces = surfaces || volact_kind(shape) == VOLACT_FIRST;
-                if volact_is_done(k) { return; }
             }
         }
         if surfaces { hit = volact_next_hit(ray, t); }

@@ -1,7 +1,8 @@
 // A volume parameter: its functions over a texture that holds the whole data.
 //
 // Constants given before: ROW, the first row of its numbers; TEXTURE, its binding; CHANNELS, the
-// texture's; NEAREST and HARDWARE, how values between samples arise.
+// texture's; NEAREST, whether values between samples are those of the nearest. `volact_linear`, which
+// interpolates, is in exact.wgsl or hardware.wgsl.
 //
 // Rows: 0 to 2 local space to sample coordinates; 3 first sample of the region, component; 4 last
 // sample, spacing; 5 last sample of the data, number of components; 6 scale and offset to data
@@ -9,39 +10,12 @@
 // 10 what the components mean, and one over the numbers of samples.
 
 @group(1) @binding(TEXTURE) var volact_texture: texture_3d<f32>;
-@group(1) @binding(0) var volact_sampler: sampler;
 
 fn volact_mapped(first: u32, p: vec3<f32>) -> vec3<f32> {
     let q = vec4<f32>(p, 1.0);
     let x = dot(volact_floats(ROW + first), q);
     let y = dot(volact_floats(ROW + first + 1u), q);
     return vec3<f32>(x, y, dot(volact_floats(ROW + first + 2u), q));
-}
-
-// Constants keep their value to the bit, and a sample without weight does not count.
-fn volact_between(a: vec4<f32>, b: vec4<f32>, t: f32) -> vec4<f32> {
-    let mixed = a + t * (b - a);
-    return select(select(mixed, b, t == 1.0), a, t == 0.0);
-}
-
-// The texture's numbers at sample coordinates, which are clamped to a region.
-fn volact_linear(x: vec3<f32>, low: vec3<f32>, high: vec3<f32>) -> vec4<f32> {
-    let at = clamp(x, low, high);
-    if HARDWARE {
-        return textureSampleLevel(volact_texture, volact_sampler, (at + 0.5) * volact_floats(ROW + 10u).yzw, 0.0);
-    }
-    let base = clamp(floor(at), low, max(high - 1.0, low));
-    let t = at - base;
-    let top = vec3<i32>(high);
-    let i = clamp(vec3<i32>(base), vec3<i32>(low), top);
-    let j = min(i + 1, top);
-    let a = volact_between(textureLoad(volact_texture, i, 0), textureLoad(volact_texture, vec3<i32>(j.x, i.yz), 0), t.x);
-    let b = volact_between(textureLoad(volact_texture, vec3<i32>(i.x, j.y, i.z), 0),
-        textureLoad(volact_texture, vec3<i32>(j.xy, i.z), 0), t.x);
-    let c = volact_between(textureLoad(volact_texture, vec3<i32>(i.xy, j.z), 0),
-        textureLoad(volact_texture, vec3<i32>(j.x, i.y, j.z), 0), t.x);
-    let d = volact_between(textureLoad(volact_texture, vec3<i32>(i.x, j.yz), 0), textureLoad(volact_texture, j, 0), t.x);
-    return volact_between(volact_between(a, b, t.y), volact_between(c, d, t.y), t.z);
 }
 
 fn volact_closest(x: vec3<f32>, low: vec3<f32>, high: vec3<f32>) -> vec4<f32> {
