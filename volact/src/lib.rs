@@ -69,8 +69,6 @@ pub fn with_builtins() -> Registry {
     volact_wgpu::register(&mut registry).expect("the names of built-ins are free");
     #[cfg(feature = "vulkan")]
     volact_vulkan::register(&mut registry).expect("the names of built-ins are free");
-    #[cfg(feature = "vulkan")]
-    volact_vulkan::register(&mut registry).expect("the names of built-ins are free");
     for loader in volact_files::loaders() {
         registry.add_loader(loader).expect("the names of built-ins are free");
     }
