@@ -185,7 +185,12 @@ impl RenderAction for VulkanAction {
             Ok(())
         })?;
         log::debug!("{NAME}: manages {:?}", shape.name());
-        found.map_or(Ok(()), |resolved| self.fetch(&resolved))
+        let fetched = found.map_or(Ok(()), |resolved| self.fetch(&resolved));
+        if fetched.is_err() {
+            // What cannot be brought to the device is not taken in.
+            _ = self.lifecycle.unmanage(shape);
+        }
+        fetched
     }
 
     fn unmanage(&mut self, shape: &Shape) -> Result<(), ActionError> {

@@ -205,6 +205,12 @@ impl Drawing {
             return Ok((Arc::clone(pipeline), layout.clone()));
         }
         let backend = |source| ActionError::Backend { action: NAME.into(), source };
+        let most = gpu.limits.max_per_stage_descriptor_sampled_images;
+        let images = key.shapes.iter().flat_map(|(_, volumes)| volumes).flatten().count();
+        if images > most as usize {
+            let wanted = format!("at most {most} on adapter {:?}; draw fewer in a frame", gpu.name());
+            return Err(limit("number of volumes".into(), images.to_string(), wanted));
+        }
         let composition = compose_slices(recipes, key.spans).map_err(|e| backend(Box::new(e)))?;
         let pipeline = Pipeline::new(gpu, &composition, &self.cache).map_err(|e| backend(Box::new(e)))?;
         let (pipeline, layout) = (Arc::new(pipeline), composition.layout);
