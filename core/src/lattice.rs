@@ -62,6 +62,13 @@ impl Lattice {
         Split { first, whole: [k0, k1], last }
     }
 
+    /// Numbers of the first segment that reaches into `[low, high]`, and of the one after the last. An
+    /// interval without length has none.
+    pub fn touched(&self, low: f64, high: f64) -> [i64; 2] {
+        let first = (low / self.step).floor() as i64;
+        if low < high { [first, (high / self.step).ceil() as i64] } else { [first; 2] }
+    }
+
     /// All segments of an interval in order.
     pub fn segments(&self, t0: f64, t1: f64) -> impl Iterator<Item = Segment> {
         let split = self.split(t0, t1);
@@ -89,6 +96,13 @@ mod tests {
                 at = s.end;
             }
             prop_assert!((at - (t0 + length)).abs() < 1e-9);
+        }
+
+        #[test]
+        fn touched_segments_are_those_of_the_interval(t0 in -9.0..9.0f64, length in 0.0..5.0f64, step in 0.1..2.0f64) {
+            let lattice = Lattice { step };
+            let [first, end] = lattice.touched(t0, t0 + length);
+            prop_assert!(lattice.segments(t0, t0 + length).map(|s| s.k).eq(first..end));
         }
 
         #[test]

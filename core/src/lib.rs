@@ -35,6 +35,7 @@ pub mod select;
 pub mod shader;
 pub mod shader_file;
 pub mod shape;
+pub mod slicing;
 pub mod table;
 pub mod volume;
 pub mod warning;
@@ -43,7 +44,7 @@ pub use action::{ActionError, Caps, Context, Options, RenderAction};
 pub use attribute::Attribute;
 pub use bulk::{Buffer, Bulk};
 pub use bvh::Bvh;
-pub use camera::{Camera, Projection, Ray, RayGrid, View};
+pub use camera::{Camera, LinearRays, Projection, Ray, RayGrid, View};
 pub use frame::{Frame, FrameDesc, Method, Statistics, Viewport};
 pub use geometry::{
     Aabb, Block, CellType, CellTypes, Clip, ClipRegion, Cylinder, Geometry, Mesh, Plane, Points, SliceStyle, Sliced,

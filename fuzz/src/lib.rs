@@ -1,11 +1,20 @@
 //! What the fuzz targets do: open arbitrary bytes as each format, read volumes whole and by region
-//! and meshes whole, and check what must hold of every file that is accepted.
+//! and meshes whole, and check what must hold of every file that is accepted; `slicing` cuts meshes of arbitrary
+//! numbers.
 //!
 //! Files lie in memory. Formats whose header names other files find `a`, `b` and `c` beside it.
 
 use std::path::Path;
 
-use volact_core::{LoadOptions, Mesh, Region, StructuredMesh, Volume, loader::NoProgress};
+use volact_core::{
+    Appearance, Attribute, Buffer, Camera, Clip, ClipRegion, FrameDesc, LoadOptions, LookupTable, Mesh, Plane, Region,
+    Registry, ScalarType, Shape, StructuredMesh, Volume,
+    geometry::{CellType, CellTypes},
+    glam::DVec3,
+    loader::NoProgress,
+    resolve::ResolvedShape,
+    slicing::{Order, Polygons, Rate, Sampling, SamplingMode, SamplingSpace, Slicing, Solid},
+};
 use volact_files::{Storage, open_in, read_mesh_in};
 
 /// Volumes beyond are opened, but not read.
@@ -178,4 +187,68 @@ pub fn ply(data: &[u8]) {
 /// STL.
 pub fn stl(data: &[u8]) {
     single_mesh("stl", "m.stl", data);
+}
+
+/// The next number of the bytes: small and whole, or any at all.
+fn number(data: &mut &[u8]) -> Option<f64> {
+    let (kind, rest) = data.split_first()?;
+    if kind % 4 != 0 {
+        *data = rest;
+        return Some(f64::from(*kind as i8) / 8.0);
+    }
+    let (bits, rest) = rest.split_first_chunk()?;
+    *data = rest;
+    Some(f64::from_le_bytes(*bits)).filter(|v| v.is_finite())
+}
+
+fn vector(data: &mut &[u8]) -> Option<DVec3> {
+    Some(DVec3::new(number(data)?, number(data)?, number(data)?))
+}
+
+/// A mesh of tetrahedra, an eye, a clip plane and a way of sampling, all of any numbers.
+fn scene(data: &mut &[u8]) -> Option<(Shape, FrameDesc, Sampling)> {
+    let (setting, rest) = data.split_first()?;
+    *data = rest;
+    let frame = FrameDesc::new(Camera::perspective(vector(data)?, vector(data)?, DVec3::Z, 40.0), 16, 16);
+    let region = ClipRegion::plane(Plane::new(vector(data)?, vector(data)?).ok()?);
+    let mut points = Vec::new();
+    while let Some(point) = vector(data) {
+        points.push(point);
+    }
+    let cells: Vec<u32> = (3..points.len() as u32).flat_map(|i| [i - 3, i - 2, i - 1, i]).collect();
+    let scalars = Attribute::new("t", ScalarType::F64, 3, Buffer::from_vec(points.clone())).ok()?;
+    let mesh = Mesh::new(points.into(), CellTypes::All(CellType::Tetrahedron), Buffer::from_vec(cells)).ok()?;
+    let appearance = Appearance::new("attribute").with("scalars", scalars).with("unit_distance", 1.0);
+    let shape = Shape::new(mesh, appearance.with("lookup_table", LookupTable::grey([0.0, 1.0])));
+    shape.set_clip(Clip::new([if setting & 64 == 0 { region } else { region.cut() }]));
+    let modes = [SamplingMode::Auto, SamplingMode::AxisAligned, SamplingMode::SphericalShells, SamplingMode::Auto];
+    let spaces = [SamplingSpace::ViewVolume, SamplingSpace::Object, SamplingSpace::Primitive, SamplingSpace::ViewVolume];
+    let sampling = Sampling {
+        mode: modes[usize::from(setting & 3)],
+        space: spaces[usize::from(setting >> 2 & 3)],
+        rate: Rate::Distance(f64::from(setting >> 4 & 3) + 0.25),
+        most_planes: Some(64),
+    };
+    Some((shape, frame, sampling))
+}
+
+/// Meshes of any numbers along any planes: no more planes than asked for, and polygons that are whole.
+pub fn slicing(mut data: &[u8]) {
+    let Some((shape, frame, sampling)) = scene(&mut data) else { return };
+    let registry = Registry::with_core();
+    let Ok(resolved) = ResolvedShape::new(&shape, registry.shaders()) else { return };
+    let Ok(Some(solid)) = Solid::new(&resolved, None) else { return };
+    let Ok(slicing) = Slicing::new(vec![&solid], &frame, &sampling) else { return };
+    assert!(slicing.step().planes <= 64);
+    let mut polygons = Polygons::new();
+    let mut sweep = slicing.sweep(Order::BackToFront);
+    while let Some(slice) = sweep.next_slice() {
+        slice.polygons(&mut polygons);
+        for face in polygons.faces() {
+            // A quadrilateral cut by the clip plane and by near and far.
+            assert!((3..=7).contains(&face.count));
+            assert_eq!(polygons.triangles(face).len() as u32, face.count - 2);
+            assert!(polygons.vertices(face).all(|v| !v.object.is_nan() && v.attributes.len() == 3));
+        }
+    }
 }

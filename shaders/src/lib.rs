@@ -7,7 +7,8 @@
 //! 1. reads both files ([`load`], [`load_folder`]) into a [`ShaderEntry`](volact_core::ShaderEntry),
 //! 2. checks the text ([`Program`]): what is wrong is shown with the author's file, line and caret,
 //! 3. compiles a function of it, with the uniform parameters of a shape, into a [`Kernel`],
-//! 4. evaluates that over batches of samples ([`Machine`]), in `f32` or `f64`.
+//! 4. evaluates that over batches of samples ([`Machine`]), in `f32` or `f64`,
+//! 5. or composes it with the framework's own texts for a GPU ([`gpu`]).
 //!
 //! What the functions of volumes, tables and attributes give is asked of an [`Environment`]: that
 //! is the action's part.
@@ -15,6 +16,7 @@
 pub mod builtin;
 pub mod error;
 pub mod eval;
+pub mod gpu;
 pub mod plain;
 mod program;
 mod refuse;

@@ -60,11 +60,15 @@ impl RegistryExt for Registry {
     }
 }
 
-/// A registry of everything that comes with Volact: core, the CPU actions, all loaders, and
-/// shaders by their source.
+/// A registry of everything that comes with Volact: core, the CPU actions, with the features `wgpu`
+/// and `vulkan` those on GPUs, all loaders, and shaders by their source.
 pub fn with_builtins() -> Registry {
     let mut registry = Registry::with_core();
     volact_cpu::register(&mut registry).expect("the names of built-ins are free");
+    #[cfg(feature = "wgpu")]
+    volact_wgpu::register(&mut registry).expect("the names of built-ins are free");
+    #[cfg(feature = "vulkan")]
+    volact_vulkan::register(&mut registry).expect("the names of built-ins are free");
     for loader in volact_files::loaders() {
         registry.add_loader(loader).expect("the names of built-ins are free");
     }

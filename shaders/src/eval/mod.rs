@@ -22,6 +22,7 @@ mod uniforms;
 mod vanish;
 
 pub(crate) use lower::lower;
+pub(crate) use uniforms::Uniform;
 
 pub use check::MAX_SCALARS;
 pub use kernel::{Field, Function, Input, Kernel};

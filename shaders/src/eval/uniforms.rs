@@ -24,7 +24,7 @@ pub struct Uniforms<'a> {
 }
 
 /// A uniform value: floats, or a single whole number or truth value.
-pub(super) enum Uniform {
+pub(crate) enum Uniform {
     Floats(Vec<f64>),
     Int(i64),
     Bool(bool),
@@ -32,7 +32,7 @@ pub(super) enum Uniform {
 
 impl Uniforms<'_> {
     /// The value of a function that depends on no sample; `None` for one that does.
-    pub(super) fn value(&self, program: &Program, function: Function) -> Option<Uniform> {
+    pub(crate) fn value(&self, program: &Program, function: Function) -> Option<Uniform> {
         let parameter = program.declaration().parameters.get(function.parameter)?;
         let given = self.parameters.get(&parameter.name);
         let kind = kind_of(parameter);

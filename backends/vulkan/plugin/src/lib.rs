@@ -1,0 +1,7 @@
+//! The action `vulkan` as a plugin.
+//!
+//! `cargo build --release -p volact-vulkan-plugin` makes the library; a host that links this crate hands
+//! [`volact_plugin()`] to [`link`](volact_plugin::plugin::host::link). Where the action is built in, too, the
+//! config says whose is taken: `names: {"vulkan": "volact-vulkan-plugin"}`.
+
+volact_plugin::export!(volact_vulkan::register);

@@ -1,0 +1,90 @@
+//! What `vulkan` draws, and the errors for what it does not.
+
+use volact_core::{
+    ActionError, Caps, Compositing, ParameterValue, TableInterpolation, resolve::ResolvedShape, slicing::SlicingError,
+};
+use volact_shaders::Program;
+
+/// The action's name.
+pub const NAME: &str = "vulkan";
+
+/// The most stretches that clips may leave of a ray.
+pub const SPANS: u32 = 16;
+
+const INSTEAD: &str = "draw it with the action cpu";
+
+/// What it can do.
+pub fn caps(device: &str) -> Caps {
+    let over = |s: &volact_core::ShaderEntry| s.compositing == Compositing::Over && s.declaration.name != "attribute";
+    let builtin = volact_shaders::builtin().unwrap_or_default();
+    Caps {
+        shaders: Some(builtin.into_iter().filter(over).map(|s| s.declaration.name).collect()),
+        sources: true,
+        geometries: Some(vec!["block".into()]),
+        compositing: vec![Compositing::Over],
+        overlap: true,
+        depth: true,
+        device: device.into(),
+    }
+}
+
+/// Refuses what cannot be drawn.
+///
+/// # Errors
+/// [`ActionError::Unsupported`], by name and with a cure.
+pub fn check(shape: &ResolvedShape, program: &Program) -> Result<(), ActionError> {
+    match refused(shape, program) {
+        None => Ok(()),
+        Some((what, cure)) => {
+            Err(ActionError::Unsupported { action: NAME.into(), shape: shape.name.clone(), what, cure: cure.into() })
+        }
+    }
+}
+
+fn refused(shape: &ResolvedShape, program: &Program) -> Option<(String, &'static str)> {
+    let (name, compositing) = (&shape.shader.declaration.name, program.compositing());
+    let geometry = &shape.state.geometry;
+    if geometry.as_block().is_none() {
+        return Some((format!("geometry {:?}", geometry.name()), INSTEAD));
+    }
+    if geometry.slices().is_some() {
+        return Some(("slice planes".into(), INSTEAD));
+    }
+    if compositing != Compositing::Over {
+        return Some((format!("shader {name:?} of compositing {}", compositing.name()), INSTEAD));
+    }
+    for (parameter, value) in &shape.parameters {
+        match value {
+            ParameterValue::Table(t) if t.interpolation() == TableInterpolation::Pre => {
+                let cure = "let it apply after interpolation, or draw with the action cpu";
+                return Some((format!("the pre-interpolated table {parameter:?}"), cure));
+            }
+            ParameterValue::Attribute(_) => return Some((format!("the attribute {parameter:?}"), INSTEAD)),
+            _ => {}
+        }
+    }
+    let component = shape.int("component").filter(|_| program.declaration().parameter("component").is_some());
+    let wanted = component.map_or(0, |c| usize::try_from(c).unwrap_or(usize::MAX));
+    shape.parameters.iter().find_map(|(name, value)| {
+        let ParameterValue::Volume(texture) = value else { return None };
+        let count = texture.volume().desc().components;
+        let what = format!("component {wanted} of parameter {name:?} with {count}");
+        (wanted >= count).then_some((what, "name a component that is there"))
+    })
+}
+
+/// The error of a limit that is passed.
+pub fn limit(what: String, found: String, wanted: String) -> ActionError {
+    ActionError::Limit { action: NAME.into(), what, found, wanted }
+}
+
+/// Why a frame cannot be sliced, as an error of the action.
+pub fn sliced(error: SlicingError) -> ActionError {
+    match error {
+        SlicingError::Camera(error) => ActionError::Frame(error.into()),
+        SlicingError::TooMany { shape, found, wanted } => {
+            limit(format!("number of planes through shape {shape:?}"), found, format!("at most {wanted}"))
+        }
+        other => ActionError::Backend { action: NAME.into(), source: Box::new(other) },
+    }
+}

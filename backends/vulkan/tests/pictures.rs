@@ -1,0 +1,273 @@
+//! Pictures held to `reference` on planes, with the validation layers listening.
+//!
+//! Where there is no Vulkan at all, each test says so and ends. Where there is, the layers have to be
+//! installed, and whatever they say fails the test.
+
+use volact_core::{
+    Aabb, ActionError, Appearance, Camera, Clip, ControlPoint, Frame, FrameDesc, LookupTable, Opaque, OpaqueDepth,
+    Options, Plane, Projection, Registry, RenderAction, ScalarType, Shape, Sphere, TableInterpolation, Viewport,
+    Volume, VolumeDesc, WarningCode,
+    geometry::ClipRegion,
+    glam::{DAffine3, DVec3},
+    resolve::ResolvedShape,
+};
+use volact_cpu::reference::{Method, ReferenceOptions, integrate};
+
+fn registry() -> Registry {
+    let mut registry = Registry::with_core();
+    volact_vulkan::register(&mut registry).unwrap();
+    registry
+}
+
+/// The action with the layers listening; `None`, and a word, where there is no Vulkan.
+fn action(options: &[(&str, volact_core::ParameterValue)]) -> Option<Box<dyn RenderAction>> {
+    let registry = registry();
+    if let Err(error) = registry.action("vulkan", &Options::default()) {
+        let ActionError::Backend { source, .. } = &error else { panic!("{error}") };
+        println!("skipped: {source}");
+        return None;
+    }
+    let mut all: Options = options.iter().map(|(n, v)| ((*n).to_owned(), v.clone())).collect();
+    all.insert("validation".into(), true.into());
+    all.entry("termination".into()).or_insert(0.0.into());
+    Some(registry.action("vulkan", &all).unwrap())
+}
+
+fn table() -> LookupTable {
+    let point = |value, color, opacity| ControlPoint { value, color, opacity };
+    let all =
+        vec![point(0.0, [0.1, 0.5, 0.9], 0.0), point(90.0, [0.9, 0.4, 0.2], 0.3), point(200.0, [1.0, 0.9, 0.1], 0.7)];
+    LookupTable::from_points(all).unwrap()
+}
+
+/// A volume of 12³ samples of a type, about 20 to 230.
+fn data(scalar: ScalarType) -> Volume {
+    let n = 12;
+    let value = |i: usize| {
+        let [x, y, z] = [i % n, i / n % n, i / n / n].map(|v| v as f64);
+        125.0 + 60.0 * (0.7 * x).sin() * (0.5 * y).cos() + 40.0 * (0.6 * z + 0.3 * x).sin()
+    };
+    let all = (0..n * n * n).map(value);
+    let desc = VolumeDesc::new([n; 3], scalar, 1);
+    match scalar {
+        ScalarType::U8 => Volume::new(desc, all.map(|v| v as u8).collect::<Vec<_>>()),
+        ScalarType::U16 => Volume::new(desc, all.map(|v| v as u16).collect::<Vec<_>>()),
+        ScalarType::I16 => Volume::new(desc, all.map(|v| v as i16).collect::<Vec<_>>()),
+        ScalarType::F32 => Volume::new(desc, all.map(|v| v as f32).collect::<Vec<_>>()),
+        _ => Volume::new(desc, all.collect::<Vec<f64>>()),
+    }
+    .unwrap()
+}
+
+fn block(scalar: ScalarType) -> Shape {
+    let look = Appearance::new("lut").with("lookup_table", table()).with("unit_distance", 1.5);
+    let shape = Shape::around(&data(scalar), look);
+    shape.set_transform(
+        DAffine3::from_rotation_y(0.4)
+            * DAffine3::from_scale(DVec3::new(1.2, -0.7, 0.9))
+            * DAffine3::from_rotation_z(0.3),
+    );
+    shape
+}
+
+fn draw(action: &mut dyn RenderAction, shapes: &[Shape], frame: &FrameDesc) -> Frame {
+    shapes.iter().for_each(|s| action.manage(s).unwrap());
+    action.begin_draw(frame).unwrap();
+    shapes.iter().for_each(|s| action.draw(s).unwrap());
+    action.end_draw().unwrap()
+}
+
+fn planes(shapes: &[Shape], frame: &FrameDesc, step: f64) -> (Vec<[f64; 4]>, Vec<f64>) {
+    let registry = Registry::with_core();
+    let shapes: Vec<_> = shapes.iter().map(|s| ResolvedShape::new(s, registry.shaders()).unwrap()).collect();
+    let options = ReferenceOptions { method: Method::Planes, sample_distance: step, ..ReferenceOptions::default() };
+    let made = integrate(&shapes, frame, &options).unwrap();
+    (made.color, made.depth)
+}
+
+fn worst(frame: &Frame, wanted: &[[f64; 4]]) -> f64 {
+    let found = frame.color.iter().flatten().map(|v| f64::from(*v));
+    found.zip(wanted.iter().flatten()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+}
+
+fn center() -> DVec3 {
+    block(ScalarType::U8).state().world_bounds().center()
+}
+
+fn views() -> Vec<FrameDesc> {
+    let (target, eye) = (center(), center() + DVec3::new(9.0, -17.0, 8.0));
+    let perspective = |near, far| Camera::LookAt {
+        eye,
+        target,
+        up: DVec3::Z,
+        projection: Projection::Perspective { fov_y: 45.0 },
+        near,
+        far,
+    };
+    let mut part = FrameDesc::new(perspective(0.0, f64::INFINITY), 70, 50);
+    part.viewport = Some(Viewport { x: 7, y: 5, width: 48, height: 40 });
+    vec![
+        FrameDesc::new(perspective(0.0, f64::INFINITY), 48, 40),
+        FrameDesc::new(perspective(19.0, 23.0), 48, 40),
+        FrameDesc::new(Camera::orthographic(eye, target, DVec3::Z, 14.0), 48, 40),
+        // Head on: faces that are seen edge-on.
+        FrameDesc::new(Camera::orthographic(target - DVec3::Y * 30.0, target, DVec3::Z, 14.0), 48, 40),
+        // From within.
+        FrameDesc::new(Camera::perspective(target, target + DVec3::X, DVec3::Z, 80.0), 48, 40),
+        part,
+    ]
+}
+
+/// f32 over some 60 segments of a ray, each within a few roundings: 60 × 2⁻²⁴ × 4, and as much for places.
+const TOLERANCE: f64 = 3e-5;
+
+#[test]
+fn blocks_are_those_of_the_reference_on_planes() {
+    let Some(mut action) = action(&[("sample_distance", 0.31.into())]) else { return };
+    for (number, frame) in views().into_iter().enumerate() {
+        for scalar in [ScalarType::U8, ScalarType::I16, ScalarType::F32, ScalarType::F64] {
+            let shapes = [block(scalar)];
+            let (wanted, depth) = planes(&shapes, &frame, 0.31);
+            let made = draw(&mut *action, &shapes, &frame);
+            let error = worst(&made, &wanted);
+            assert!(error < TOLERANCE, "view {number}, {scalar}: {error:e}");
+            assert!(wanted.iter().any(|p| p[3] > 0.5));
+            for (found, wanted) in made.depth.iter().zip(&depth) {
+                let far = (f64::from(*found) - wanted).abs();
+                assert!(found.is_infinite() == wanted.is_infinite() || far < 1e-3, "{found} {wanted}");
+                assert!(wanted.is_infinite() || far < 1e-3, "view {number}, {scalar}: {found} {wanted}");
+            }
+            assert!(made.statistics.rays > 0 && made.method.blend == "f32");
+            action.unmanage(&shapes[0]).unwrap();
+        }
+    }
+}
+
+#[test]
+fn clips_and_what_is_opaque_cut_rays() {
+    let Some(mut action) = action(&[("sample_distance", 0.27.into())]) else { return };
+    let plane = |p: DVec3, n: [f64; 3]| Plane::new(p, n.into()).unwrap();
+    let inner = Aabb::new(DVec3::splat(3.0), DVec3::new(8.5, 7.5, 9.0));
+    for frame in views() {
+        let pixels = frame.width * frame.height;
+        let distance: Vec<f32> = (0..pixels).map(|i| if i % 3 == 0 { 21.0 } else { f32::INFINITY }).collect();
+        let color: Vec<[f32; 4]> = (0..pixels).map(|i| [0.2, 0.1, (i % 5) as f32 * 0.1, 0.8]).collect();
+        let opaque = Opaque { color: Some(color.into()), depth: OpaqueDepth::Distance(distance.into()) };
+        let world = Clip::new([ClipRegion::plane(plane(center() + DVec3::Z * 2.0, [0.3, 0.1, -1.0]))]);
+        let frame = frame.with_clip(world).with_opaque(opaque);
+        let shape = block(ScalarType::U16);
+        shape.set_clip(Clip::new([ClipRegion::crop(inner).cut()]));
+        let (wanted, _) = planes(std::slice::from_ref(&shape), &frame, 0.27);
+        let error = worst(&draw(&mut *action, &[shape], &frame), &wanted);
+        assert!(error < TOLERANCE, "{error:e}");
+    }
+}
+
+/// Shapes that overlap take turns: of second order, and the same whatever the order of drawing.
+#[test]
+fn overlapping_shapes_are_of_second_order() {
+    let Some(mut action) = action(&[]) else { return };
+    let other = block(ScalarType::U8);
+    other.set_transform(DAffine3::from_translation(DVec3::new(2.0, -1.5, 1.0)) * other.state().transform);
+    let (shapes, frame) = ([block(ScalarType::U8), other], &views()[0]);
+    let registry = Registry::with_core();
+    let resolved: Vec<_> = shapes.iter().map(|s| ResolvedShape::new(s, registry.shaders()).unwrap()).collect();
+    let exact = integrate(&resolved, frame, &ReferenceOptions::default()).unwrap().color;
+    let mut error = |step: f64| {
+        action.set_option("sample_distance", step.into()).unwrap();
+        let made = draw(&mut *action, &shapes, frame);
+        let swapped = draw(&mut *action, &[shapes[1].clone(), shapes[0].clone()], frame);
+        assert_eq!(made.color, swapped.color);
+        let all = made.color.iter().flatten().zip(exact.iter().flatten());
+        (all.map(|(a, b)| (f64::from(*a) - b).powi(2)).sum::<f64>() / exact.len() as f64).sqrt()
+    };
+    let order = (error(0.4) / error(0.1)).log2() / 2.0;
+    assert!((1.6..2.5).contains(&order), "{order}");
+}
+
+#[test]
+fn pictures_repeat_and_only_changes_are_moved() {
+    let Some(mut action) = action(&[("termination", 1e-3.into())]) else { return };
+    let (shape, frame) = (block(ScalarType::U8), views().remove(0));
+    let shapes = [shape];
+    let first = draw(&mut *action, &shapes, &frame);
+    assert!(first.statistics.rebuilt.iter().any(|r| r.what == "texture" && r.bytes == 12 * 12 * 12));
+    let again = draw(&mut *action, &shapes, &frame);
+    assert_eq!(first.color, again.color);
+    assert!(again.statistics.rebuilt.is_empty(), "{:?}", again.statistics.rebuilt);
+    // The polygons' corners alone.
+    assert!(again.statistics.uploaded_bytes < 24 * 12 * 10, "{}", again.statistics.uploaded_bytes);
+    shapes[0].set_parameter("lookup_table", LookupTable::window_level(100.0, 100.0, 0.5).unwrap());
+    let other = draw(&mut *action, &shapes, &frame);
+    assert!(other.color != first.color && other.statistics.rebuilt.is_empty());
+    assert!(other.statistics.uploaded_bytes < 8192, "{}", other.statistics.uploaded_bytes);
+    // A ray that ends early has less than that left to see.
+    action.set_option("termination", 0.0.into()).unwrap();
+    let whole = draw(&mut *action, &shapes, &frame);
+    let pairs = whole.color.iter().zip(other.color.iter());
+    assert!(pairs.flat_map(|(a, b)| a.iter().zip(b)).all(|(a, b)| (a - b).abs() <= 1e-3));
+}
+
+#[test]
+fn what_is_not_drawn_is_refused_by_name() {
+    let Some(mut action) = action(&[]) else { return };
+    let volume = data(ScalarType::U8);
+    let sphere = Sphere::new(DVec3::ZERO, 1.0, 12).unwrap();
+    let lut = || Appearance::new("lut").with("lookup_table", table());
+    let pre = table().pre_interpolated();
+    assert_eq!(pre.interpolation(), TableInterpolation::Pre);
+    let shapes = [
+        (Shape::new(sphere, lut().with("volume", &volume)), "geometry \"sphere\""),
+        (Shape::around(&volume, Appearance::new("mip")), "compositing maximum"),
+        (Shape::around(&volume, Appearance::new("lut").with("lookup_table", pre)), "pre-interpolated table"),
+        (Shape::around(&volume, lut().with("component", 3i64)), "component 3"),
+    ];
+    for (shape, words) in shapes {
+        let error = action.manage(&shape).unwrap_err();
+        assert!(matches!(error, ActionError::Unsupported { .. }) && error.to_string().contains(words), "{error}");
+    }
+    // The action is as good as before.
+    let shapes = [block(ScalarType::U8)];
+    assert!(draw(&mut *action, &shapes, &views()[0]).statistics.rays > 0);
+    let error = registry().action("vulkan", &Options::from([("adapter".into(), "no such thing".into())]));
+    let error = error.map(|_| ()).unwrap_err();
+    let source = std::error::Error::source(&error).unwrap().to_string();
+    assert!(source.contains("no such thing") && source.contains("another name"), "{source}");
+}
+
+#[test]
+fn a_bound_on_planes_widens_the_step_and_says_so() {
+    let Some(mut action) = action(&[("sample_distance", 0.01.into()), ("max_planes", 40i64.into())]) else { return };
+    let made = draw(&mut *action, &[block(ScalarType::U8)], &views()[0]);
+    assert!(made.method.sample_distance > 0.3);
+    assert!(made.warnings.iter().any(|w| w.code == WarningCode::SettingAdjusted), "{:?}", made.warnings);
+    let planes = made.statistics.details.iter().find(|(n, _)| n == "planes").unwrap();
+    assert!(planes.1.parse::<usize>().unwrap() <= 40);
+}
+
+#[test]
+fn pipelines_are_kept_on_disk_and_damaged_files_left_aside() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("pipelines");
+    let option = [("pipeline_cache", path.to_str().unwrap().into())];
+    let Some(mut action) = action(&option) else { return };
+    let frame = views().remove(0);
+    let first = draw(&mut *action, &[block(ScalarType::U8)], &frame);
+    let file = std::fs::read_dir(&path).unwrap().next().unwrap().unwrap().path();
+    let size = std::fs::metadata(&file).unwrap().len();
+    assert!(size >= 32);
+    for damage in [Vec::new(), vec![7u8; 100], std::fs::read(&file).unwrap()[..20].to_vec()] {
+        std::fs::write(&file, damage).unwrap();
+        let mut action = self::action(&option).unwrap();
+        assert_eq!(draw(&mut *action, &[block(ScalarType::U8)], &frame).color, first.color);
+        assert!(std::fs::metadata(&file).unwrap().len() >= 32);
+    }
+    assert_eq!(std::fs::read_dir(&path).unwrap().count(), 1);
+}
+
+#[test]
+fn nothing_drawn_is_nothing_seen() {
+    let Some(mut action) = action(&[]) else { return };
+    let made = draw(&mut *action, &[], &views()[0]);
+    assert!(made.color.iter().all(|c| *c == [0.0; 4]) && made.depth.iter().all(|d| d.is_infinite()));
+}

@@ -1,0 +1,52 @@
+//! The action `wgpu`: Vulkan, Metal or Direct3D 12 through one interface.
+//!
+//! # How core's words map to the device's
+//! | word | here |
+//! |---|---|
+//! | volume | a 3D texture of the whole data, one for all shapes that show it ([`resources`]) |
+//! | lookup table | rows of a storage buffer, control points at any places, found by buckets |
+//! | shader | the author's functions merged into one compute module ([`volact_shaders::gpu`], [`pipeline`]) |
+//! | frame | a dispatch of one invocation a pixel, summed in f32 registers ([`draw`], [`readback`]) |
+//!
+//! Everything that a frame needs is kept and compared with what is there at `begin_draw`: voxels by
+//! identity and version, rows of numbers and tables by content. A changed table moves its own rows, a
+//! changed shader makes a pipeline and moves no voxel, and a frame like the last creates nothing.
+//!
+//! # Precision
+//! Places are counted in f32 from an anchor that the host finds in f64 ([`volact_shaders::gpu::Anchor`]).
+//! A sample's place has an error of some 2⁻²² of the scene's size, wherever in the world it lies and
+//! however far away the eye is. Shapes of one frame that lie some 10⁶ times their size apart along a ray
+//! lose digits. Interpolation has exact weights unless the option `filter` says `hardware`.
+//!
+//! # Known gaps
+//! Meshes, surfaces, attributes and pre-interpolated tables are refused by name.
+
+mod action;
+mod check;
+pub mod device;
+pub mod draw;
+mod method;
+pub mod onto;
+mod options;
+pub mod pipeline;
+mod plan;
+mod programs;
+pub mod readback;
+pub mod resources;
+mod skip;
+
+pub use action::WgpuAction;
+pub use onto::{Onto, OntoDepth};
+pub use options::declaration;
+
+use std::sync::Arc;
+
+use volact_core::{Registry, registry::RegisterError};
+
+/// Registers the action.
+///
+/// # Errors
+/// If its name is taken.
+pub fn register(registry: &mut Registry) -> Result<(), RegisterError> {
+    registry.add_action(declaration(), Arc::new(|context, options| Ok(Box::new(WgpuAction::new(context, options)?))))
+}

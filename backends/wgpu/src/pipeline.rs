@@ -1,0 +1,149 @@
+//! Pipelines, each made once for the shaders that it draws and how it reads their volumes.
+
+use std::{collections::HashMap, sync::Arc};
+
+use volact_core::ActionError;
+use volact_shaders::gpu::{ComposeError, Layout, Recipe, VolumeUse, compose};
+
+use crate::{check::NAME, device::Gpu};
+
+/// Pipelines that are kept.
+const MOST: usize = 64;
+
+/// What a pipeline depends on.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct Key {
+    /// For each shape its shader, by address, and how its volumes are read.
+    pub shapes: Vec<(usize, Vec<Option<VolumeUse>>)>,
+    /// The stretches that clips may leave.
+    pub spans: u32,
+    /// Whether a shape has slice planes.
+    pub planes: bool,
+}
+
+/// A pipeline with its bindings.
+#[derive(Debug)]
+pub struct Pipeline {
+    /// The pipeline.
+    pub pipeline: wgpu::ComputePipeline,
+    /// The layouts of groups 0 and 1.
+    pub groups: [wgpu::BindGroupLayout; 2],
+    /// Where numbers lie.
+    pub layout: Layout,
+    /// Differs from that of every other pipeline there was.
+    pub generation: u64,
+}
+
+/// All pipelines.
+#[derive(Debug, Default)]
+pub struct Pipelines {
+    known: HashMap<Key, Arc<Pipeline>>,
+    generation: u64,
+}
+
+impl Pipelines {
+    /// The pipeline for a key, and whether it was made just now.
+    ///
+    /// # Errors
+    /// If the device cannot bind as much as the shapes need, or refuses the module.
+    pub fn get(&mut self, gpu: &Gpu, key: Key, recipes: &[Recipe]) -> Result<(Arc<Pipeline>, bool), ActionError> {
+        if let Some(known) = self.known.get(&key) {
+            return Ok((Arc::clone(known), false));
+        }
+        if self.known.len() >= MOST {
+            self.known.clear();
+        }
+        self.generation += 1;
+        let made = Arc::new(make(gpu, &key, recipes, self.generation)?);
+        self.known.insert(key, Arc::clone(&made));
+        Ok((made, true))
+    }
+}
+
+fn make(gpu: &Gpu, key: &Key, recipes: &[Recipe], generation: u64) -> Result<Pipeline, ActionError> {
+    let wrong = |error: ComposeError| ActionError::Backend { action: NAME.into(), source: Box::new(error) };
+    let made = compose(recipes, key.spans, key.planes).map_err(wrong)?;
+    check(gpu, &made.layout)?;
+    let device = &gpu.device;
+    let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+        label: Some("volact rays"),
+        source: wgpu::ShaderSource::Naga(std::borrow::Cow::Owned(made.module)),
+    });
+    let groups = [frame_group(device), volume_group(device, &key.shapes)];
+    let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        label: Some("volact rays"),
+        bind_group_layouts: &[Some(&groups[0]), Some(&groups[1])],
+        immediate_size: 0,
+    });
+    let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+        label: Some("volact rays"),
+        layout: Some(&layout),
+        module: &module,
+        entry_point: Some("volact_picture"),
+        compilation_options: wgpu::PipelineCompilationOptions::default(),
+        cache: None,
+    });
+    gpu.check()?;
+    log::debug!("wgpu: a pipeline for {} shapes", key.shapes.len());
+    Ok(Pipeline { pipeline, groups, layout: made.layout, generation })
+}
+
+/// What the shapes need against what the adapter has.
+fn check(gpu: &Gpu, layout: &Layout) -> Result<(), ActionError> {
+    let limits = &gpu.limits;
+    let needs = [
+        ("number of volumes in one picture", layout.textures, limits.max_sampled_textures_per_shader_stage),
+        ("number of bound buffers", BUFFERS, limits.max_storage_buffers_per_shader_stage),
+    ];
+    for (what, found, most) in needs {
+        if found > most {
+            return Err(ActionError::Limit {
+                action: NAME.into(),
+                what: what.into(),
+                found: found.to_string(),
+                wanted: format!("at most {most} on adapter {:?}; draw fewer shapes, or take cpu", gpu.name()),
+            });
+        }
+    }
+    Ok(())
+}
+
+/// Storage buffers of group 0.
+const BUFFERS: u32 = 7;
+
+/// A binding of a compute stage.
+pub fn entry(binding: u32, ty: wgpu::BindingType) -> wgpu::BindGroupLayoutEntry {
+    wgpu::BindGroupLayoutEntry { binding, visibility: wgpu::ShaderStages::COMPUTE, ty, count: None }
+}
+
+fn frame_group(device: &wgpu::Device) -> wgpu::BindGroupLayout {
+    let buffer = |ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
+    let storage = |read_only| buffer(wgpu::BufferBindingType::Storage { read_only });
+    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+        label: Some("volact frame"),
+        entries: &[
+            entry(0, buffer(wgpu::BufferBindingType::Uniform)),
+            entry(1, storage(true)),
+            entry(2, storage(true)),
+            entry(3, storage(true)),
+            entry(4, storage(false)),
+            entry(5, storage(false)),
+            entry(6, storage(false)),
+            entry(7, storage(true)),
+        ],
+    })
+}
+
+fn volume_group(device: &wgpu::Device, shapes: &[(usize, Vec<Option<VolumeUse>>)]) -> wgpu::BindGroupLayout {
+    let texture = |volume: &VolumeUse| wgpu::BindingType::Texture {
+        sample_type: wgpu::TextureSampleType::Float { filterable: volume.hardware },
+        view_dimension: wgpu::TextureViewDimension::D3,
+        multisampled: false,
+    };
+    let mut entries = vec![entry(0, wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering))];
+    for volume in shapes.iter().flat_map(|(_, volumes)| volumes.iter().flatten()) {
+        entries.push(entry(entries.len() as u32, texture(volume)));
+    }
+    device
+        .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some("volact volumes"), entries: &entries })
+}

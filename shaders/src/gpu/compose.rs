@@ -1,0 +1,329 @@
+//! One module from the texts of a stage and the shaders of shapes.
+
+use naga::{
+    Block, Expression, Function, FunctionArgument, FunctionResult, Handle, Literal, Module, Span, Statement,
+    SwitchCase, SwitchValue, Type,
+    valid::{Capabilities, ModuleInfo, ValidationFlags, Validator},
+};
+use volact_core::{Compositing, ParameterType};
+
+use super::{
+    ComposeError, Layout, Recipe,
+    layout::{Slot, VolumeUse, is_deep},
+    merge::{Import, Merger, named},
+};
+use crate::{
+    Entry,
+    eval::LOOP_BUDGET,
+    program::Stub,
+    signatures::{Derived, has_lengths, kind_of},
+};
+
+const LIBRARY: &str = include_str!("../../wgsl/gpu/library.wgsl");
+const HOOKS: &str = include_str!("../../wgsl/gpu/hooks.wgsl");
+const VOLUME: &str = include_str!("../../wgsl/gpu/volume.wgsl");
+const EXACT: &str = include_str!("../../wgsl/gpu/exact.wgsl");
+const HARDWARE: &str = include_str!("../../wgsl/gpu/hardware.wgsl");
+const ABSENT: &str = include_str!("../../wgsl/gpu/absent.wgsl");
+const TABLE: &str = include_str!("../../wgsl/gpu/table.wgsl");
+const NUMBER: &str = include_str!("../../wgsl/gpu/number.wgsl");
+const GIVEN: &str = include_str!("../../wgsl/gpu/given.wgsl");
+pub(super) const RAY: &str = include_str!("../../wgsl/gpu/ray.wgsl");
+/// The parts of the stage that casts rays.
+const RAYS: [&str; 7] = [
+    RAY,
+    include_str!("../../wgsl/gpu/rays.wgsl"),
+    include_str!("../../wgsl/gpu/light.wgsl"),
+    include_str!("../../wgsl/gpu/over.wgsl"),
+    include_str!("../../wgsl/gpu/sweep.wgsl"),
+    include_str!("../../wgsl/gpu/flat.wgsl"),
+    include_str!("../../wgsl/gpu/picture.wgsl"),
+];
+
+/// The parts of the stage that draws slabs.
+const SLICES: [&str; 4] = [
+    RAY,
+    include_str!("../../wgsl/gpu/rays.wgsl"),
+    include_str!("../../wgsl/gpu/light.wgsl"),
+    include_str!("../../wgsl/gpu/slices.wgsl"),
+];
+
+/// A module ready for a device.
+#[derive(Debug)]
+pub struct Composition {
+    /// The module.
+    pub module: Module,
+    /// What naga's validator found of it.
+    pub info: ModuleInfo,
+    /// Where its numbers lie.
+    pub layout: Layout,
+}
+
+/// Composes the ray-casting stage for shapes: first those that are composited in depth, then those
+/// that are a picture each, in the order in which they are laid over. `spans` is the number of
+/// stretches that clips may leave of a ray; `planes` tells that a shape may have slice planes.
+///
+/// # Errors
+/// If something cannot be put together, which would be a fault of this crate.
+pub fn compose(recipes: &[Recipe], spans: u32, planes: bool) -> Result<Composition, ComposeError> {
+    stage(recipes, spans, planes, &RAYS)
+}
+
+/// Composes the stages that draw slabs of shapes, all of which are composited in depth: a vertex stage
+/// `volact_corner` and a fragment stage `volact_run`. `spans` as for [`compose`].
+///
+/// # Errors
+/// As [`compose`].
+pub fn compose_slices(recipes: &[Recipe], spans: u32) -> Result<Composition, ComposeError> {
+    stage(recipes, spans, false, &SLICES)
+}
+
+fn stage(recipes: &[Recipe], spans: u32, planes: bool, texts: &[&str]) -> Result<Composition, ComposeError> {
+    let layout = Layout::new(recipes);
+    let library = parse("", &[])?;
+    let mut merger = Merger::default();
+    merger.share(&library)?;
+    let kinds: Vec<Compositing> = recipes.iter().map(|r| r.program.compositing()).collect();
+    let deep = kinds.iter().take_while(|c| is_deep(**c)).count();
+    let alone = deep == 1 && kinds[0] == Compositing::Over && !planes;
+    let constants = format!(
+        "const SHAPES: u32 = {}u;\nconst DEEP: u32 = {deep}u;\nconst TRACKS: u32 = {}u;\nconst SPANS: u32 = {spans}u;\n\
+         const ALONE: bool = {alone};\n",
+        recipes.len(),
+        deep.max(1),
+    );
+    let stage = parse(&constants, &[&[HOOKS], texts].concat())?;
+    let mut import = Import::new(&stage, "");
+    let mut shapes = Vec::new();
+    for (number, recipe) in recipes.iter().enumerate() {
+        shapes.push(Shape::import(&mut merger, recipe, number, &layout.slots[number])?);
+    }
+    for (hook, entry) in [("volact_shade", Entry::Shade), ("volact_value_of", Entry::Value)] {
+        let function = dispatch(&mut merger, &mut import, &stage, hook, entry, &shapes)?;
+        let handle = named(&stage, hook).ok_or_else(|| ComposeError::inner(format!("no hook {hook}")))?;
+        let made = merger.module.functions.append(function, Span::UNDEFINED);
+        import.substitute(handle, made);
+    }
+    for entry in &stage.entry_points {
+        let function = merger.body(&mut import, &entry.function)?;
+        merger.module.entry_points.push(naga::EntryPoint { function, ..entry.clone() });
+    }
+    let module = merger.module;
+    let info = validate(&module)?;
+    Ok(Composition { module, info, layout })
+}
+
+/// What naga's validator finds of a module.
+pub(super) fn validate(module: &Module) -> Result<ModuleInfo, ComposeError> {
+    let mut validator = Validator::new(ValidationFlags::all(), Capabilities::empty());
+    let wrong = |error: naga::WithSpan<naga::valid::ValidationError>| {
+        ComposeError::inner(format!("the module is not valid: {}", error.emit_to_string("")))
+    };
+    validator.validate(module).map_err(wrong)
+}
+
+/// Parses texts behind the library and constants.
+pub(super) fn parse(constants: &str, texts: &[&str]) -> Result<Module, ComposeError> {
+    let text = [constants, LIBRARY].into_iter().chain(texts.iter().copied()).collect::<Vec<_>>().join("\n");
+    naga::front::wgsl::parse_str(&text)
+        .map_err(|error| ComposeError::inner(format!("a text of the framework: {}", error.emit_to_string(&text))))
+}
+
+/// A shape's functions in the module, with the type of sample that they take.
+struct Shape {
+    entries: Vec<(Entry, Handle<Function>)>,
+    sample: Option<Handle<Type>>,
+}
+
+impl Shape {
+    fn import(merger: &mut Merger, recipe: &Recipe, number: usize, slots: &[Slot]) -> Result<Self, ComposeError> {
+        let program = &recipe.program;
+        let mut import = Import::new(program.module(), format!("s{number}_"));
+        import.guard(merger.shared("volact_round")?);
+        let parameters = &program.declaration().parameters;
+        let unit = parameters.iter().position(|p| p.name == "unit_distance").map_or(0, |i| slots[i].row);
+        let lengths =
+            has_lengths(program.declaration(), program.compositing()) && program.compositing() == Compositing::Over;
+        let medium = |row: u32| {
+            format!("const ROW: u32 = {row}u;\nconst UNIT: u32 = {unit}u;\nconst LENGTHS: bool = {lengths};\n")
+        };
+        let mut accessors = Vec::new();
+        for (parameter, (slot, volume)) in parameters.iter().zip(slots.iter().zip(&recipe.volumes)) {
+            let (constants, texts) = match kind_of(parameter) {
+                Some(ParameterType::Volume) => match volume {
+                    Some(volume) if volume.hardware => (reading(slot, volume), vec![VOLUME, HARDWARE]),
+                    Some(volume) => (reading(slot, volume), vec![VOLUME, EXACT]),
+                    None => (String::new(), vec![ABSENT]),
+                },
+                Some(ParameterType::Table) => (medium(slot.row), vec![TABLE]),
+                _ => (format!("const ROW: u32 = {}u;\n", slot.row), vec![NUMBER]),
+            };
+            accessors.push(parse(&constants, &texts)?);
+            accessors.push(parse(&medium(slot.given), &[GIVEN])?);
+        }
+        accessors.push(parse(&medium(0), &[GIVEN])?);
+        let prefix = |place: usize| match parameters.get(place / 2) {
+            Some(parameter) => format!("s{number}_{}_", parameter.name),
+            None => format!("s{number}_"),
+        };
+        let mut imports: Vec<_> = accessors.iter().enumerate().map(|(i, a)| Import::new(a, prefix(i))).collect();
+        for (handle, _) in program.module().functions.iter() {
+            let Some(stub) = program.stub(handle) else { continue };
+            let (place, name) = match stub {
+                Stub::Medium => (2 * parameters.len(), "medium"),
+                Stub::Parameter { parameter, derived: Derived::Given } => (2 * parameter + 1, "volact_given"),
+                Stub::Parameter { parameter, derived } => (2 * parameter, accessor(derived, program.module(), handle)),
+            };
+            let wanted = named(&accessors[place], name);
+            let wanted = wanted.ok_or_else(|| ComposeError::inner(format!("no function {name}")))?;
+            let made = merger.function(&mut imports[place], wanted)?;
+            import.substitute(handle, made);
+        }
+        let mut entries = Vec::new();
+        for entry in [Entry::Shade, Entry::Value] {
+            if let Some(handle) = program.entry(entry) {
+                entries.push((entry, merger.function(&mut import, handle)?));
+            }
+        }
+        let sample = program.module().types.iter().find(|(_, ty)| ty.name.as_deref() == Some("Sample"));
+        let sample = sample.map(|(handle, _)| merger.ty(&mut import, handle)).transpose()?;
+        Ok(Self { entries, sample })
+    }
+}
+
+/// The constants of a volume's text.
+fn reading(slot: &Slot, volume: &VolumeUse) -> String {
+    let VolumeUse { channels, nearest, .. } = volume;
+    let texture = slot.texture.unwrap_or(1);
+    format!(
+        "const ROW: u32 = {}u;\nconst TEXTURE: u32 = {texture}u;\nconst CHANNELS: u32 = {channels}u;\n\
+         const NEAREST: bool = {nearest};\n",
+        slot.row
+    )
+}
+
+/// The function of the framework that does what a stub only names.
+fn accessor(derived: Derived, module: &Module, stub: Handle<Function>) -> &'static str {
+    use naga::{ScalarKind as K, TypeInner as T, VectorSize as V};
+    match derived {
+        Derived::Value => "volact_value",
+        Derived::Components => "volact_components",
+        Derived::Normalized => "volact_normalized",
+        Derived::Color => "volact_color",
+        Derived::Gradient => "volact_gradient",
+        Derived::Nearest => "volact_nearest",
+        Derived::Inside => "volact_inside",
+        Derived::Coordinates => "volact_coordinates",
+        Derived::Spacing => "volact_spacing",
+        Derived::Medium => "volact_medium",
+        Derived::TableColor => "volact_table_color",
+        Derived::Segment => "volact_segment",
+        Derived::Local => "volact_local",
+        Derived::Given => "volact_given",
+        Derived::Plain | Derived::Attribute | Derived::AttributeComponents => {
+            let result = module.functions[stub].result.as_ref().map(|r| &module.types[r.ty].inner);
+            match result {
+                Some(T::Scalar(s)) if s.kind == K::Sint => "volact_i32",
+                Some(T::Scalar(s)) if s.kind == K::Uint => "volact_u32",
+                Some(T::Scalar(s)) if s.kind == K::Bool => "volact_bool",
+                Some(T::Vector { size: V::Bi, .. }) => "volact_vec2",
+                Some(T::Vector { size: V::Tri, .. }) => "volact_vec3",
+                Some(T::Vector { size: V::Quad, .. }) => "volact_vec4",
+                Some(T::Matrix { .. }) => "volact_matrix",
+                _ => "volact_f32",
+            }
+        }
+    }
+}
+
+/// A function that calls that of a shape, by its number.
+fn dispatch(
+    merger: &mut Merger,
+    import: &mut Import<'_>,
+    stage: &Module,
+    hook: &str,
+    entry: Entry,
+    shapes: &[Shape],
+) -> Result<Function, ComposeError> {
+    let handle = named(stage, hook).ok_or_else(|| ComposeError::inner(format!("no hook {hook}")))?;
+    let model = &stage.functions[handle];
+    let mut types = Vec::new();
+    for argument in &model.arguments {
+        types.push(merger.ty(import, argument.ty)?);
+    }
+    let result = model.result.as_ref().ok_or_else(|| ComposeError::inner("a hook without a result"))?.ty;
+    let result = merger.ty(import, result)?;
+    let argument = |(ty, model): (&Handle<Type>, &FunctionArgument)| FunctionArgument { ty: *ty, ..model.clone() };
+    let mut made = Function {
+        name: Some(hook.into()),
+        arguments: types.iter().zip(&model.arguments).map(argument).collect(),
+        result: Some(FunctionResult { ty: result, binding: None }),
+        ..Function::default()
+    };
+    let shape = made.expressions.append(Expression::FunctionArgument(0), Span::UNDEFINED);
+    let sample = made.expressions.append(Expression::FunctionArgument(1), Span::UNDEFINED);
+    let mut cases = Vec::new();
+    for (number, other) in shapes.iter().enumerate() {
+        let Some((_, function)) = other.entries.iter().find(|(e, _)| *e == entry) else { continue };
+        let mut body = Block::new();
+        let given = match other.sample {
+            Some(ty) if ty != types[1] => converted(merger, &mut made, &mut body, sample, ty),
+            _ => sample,
+        };
+        let called = made.expressions.append(Expression::CallResult(*function), Span::UNDEFINED);
+        let call = Statement::Call { function: *function, arguments: vec![given], result: Some(called) };
+        body.push(call, Span::UNDEFINED);
+        body.push(Statement::Return { value: Some(called) }, Span::UNDEFINED);
+        cases.push(SwitchCase { value: SwitchValue::U32(number as u32), body, fall_through: false });
+    }
+    cases.push(SwitchCase { value: SwitchValue::Default, body: Block::new(), fall_through: false });
+    begin(merger, &mut made, shape)?;
+    made.body.push(Statement::Switch { selector: shape, cases }, Span::UNDEFINED);
+    let zero = made.expressions.append(Expression::ZeroValue(result), Span::UNDEFINED);
+    made.body.push(Statement::Return { value: Some(zero) }, Span::UNDEFINED);
+    Ok(made)
+}
+
+/// A sample as a shader's own type of it, whose further members are zero.
+fn converted(
+    merger: &Merger,
+    made: &mut Function,
+    body: &mut Block,
+    sample: Handle<Expression>,
+    ty: Handle<Type>,
+) -> Handle<Expression> {
+    let members: Vec<Handle<Type>> = match &merger.module.types[ty].inner {
+        naga::TypeInner::Struct { members, .. } => members.iter().map(|m| m.ty).collect(),
+        _ => Vec::new(),
+    };
+    // Attributes, of which blocks have none, come behind the members that all samples have.
+    let zeros: Vec<_> = members.iter().skip(PLAIN_MEMBERS).map(|ty| Expression::ZeroValue(*ty)).collect();
+    let zeros: Vec<_> = zeros.into_iter().map(|zero| made.expressions.append(zero, Span::UNDEFINED)).collect();
+    let start = made.expressions.len();
+    let member = |index: usize| Expression::AccessIndex { base: sample, index: index as u32 };
+    let mut components: Vec<_> =
+        (0..PLAIN_MEMBERS).map(|index| made.expressions.append(member(index), Span::UNDEFINED)).collect();
+    components.extend(zeros);
+    let whole = made.expressions.append(Expression::Compose { ty, components }, Span::UNDEFINED);
+    body.push(Statement::Emit(made.expressions.range_from(start)), Span::UNDEFINED);
+    whole
+}
+
+/// Members that every shader's samples have.
+const PLAIN_MEMBERS: usize = 6;
+
+/// Fills the budget of loops, and says whose it is.
+fn begin(merger: &Merger, made: &mut Function, shape: Handle<Expression>) -> Result<(), ComposeError> {
+    let variable = |name: &str| {
+        let mut all = merger.module.global_variables.iter();
+        let found = all.find(|(_, v)| v.name.as_deref() == Some(name)).map(|(handle, _)| handle);
+        found.ok_or_else(|| ComposeError::inner(format!("no variable {name}")))
+    };
+    let (rounds, current) = (variable("volact_rounds")?, variable("volact_shape")?);
+    let budget = made.expressions.append(Expression::Literal(Literal::U32(LOOP_BUDGET)), Span::UNDEFINED);
+    for (variable, value) in [(rounds, budget), (current, shape)] {
+        let pointer = made.expressions.append(Expression::GlobalVariable(variable), Span::UNDEFINED);
+        made.body.push(Statement::Store { pointer, value }, Span::UNDEFINED);
+    }
+    Ok(())
+}

@@ -1,0 +1,154 @@
+// Where rays are inside shapes.
+//
+// Constants given before: SHAPES, how many; DEEP, how many of them are composited in depth: the first,
+// and TRACKS, that or 1;
+// SPANS, the stretches that clips may leave of a ray; ALONE, whether there is just one, which absorbs.
+//
+// Rows of shape i, from 8i: 0 the anchor in local space, unit distance; 1 to 3 local space to
+// the block as a unit cube; 4 first row of its clip regions, how many, how it is composited, its
+// flags; 5 first row of the values it crosses, how many, first row of its planes, how many; 6 where its
+// cells begin, and how many there are along each axis; 7 first row of the volume that the cells are of.
+// A region: how many planes, and whether its inside is kept; then its planes, normal and offset.
+
+const VOLACT_FIRST: u32 = 1u;
+const VOLACT_MAXIMUM: u32 = 2u;
+const VOLACT_MINIMUM: u32 = 3u;
+const VOLACT_AVERAGE: u32 = 4u;
+const VOLACT_ADD: u32 = 5u;
+// Flags: the shape's inside is drawn; its planes are opaque.
+const VOLACT_INSIDE: u32 = 1u;
+const VOLACT_OPAQUE: u32 = 2u;
+
+struct VolactSpans {
+    count: u32,
+    ends: array<vec2<f32>, SPANS>,
+}
+
+// Where segment k of the lattice begins.
+fn volact_border(k: i32) -> f32 { return fma(f32(k), volact_frame.step, f32(k) * volact_frame.step_rest); }
+
+fn volact_first_segment(t: f32) -> i32 { return i32(floor(t / volact_frame.step)); }
+
+// The stretch inside the shape's block: no length where there is none.
+fn volact_block(shape: u32, ray: VolactRay) -> vec2<f32> {
+    let p = vec4<f32>(volact_floats(8u * shape).xyz + ray.start, 1.0);
+    var span = vec2<f32>(ray.begin, ray.end);
+    for (var a = 1u; a <= 3u; a += 1u) {
+        let row = volact_floats(8u * shape + a);
+        let place = dot(row, p);
+        let slope = dot(row.xyz, ray.direction);
+        if slope == 0.0 {
+            if place < 0.0 || place > 1.0 { return vec2<f32>(0.0); }
+        } else {
+            let low = -place / slope;
+            let high = (1.0 - place) / slope;
+            span = vec2<f32>(max(span.x, min(low, high)), min(span.y, max(low, high)));
+        }
+    }
+    return span;
+}
+
+// The stretch inside a region of planes.
+fn volact_region(shape: u32, ray: VolactRay, row: u32) -> vec2<f32> {
+    let p = volact_floats(8u * shape).xyz + ray.start;
+    var span = vec2<f32>(-3.0e38, 3.0e38);
+    let planes = volact_numbers[row].x;
+    for (var n = 1u; n <= planes; n += 1u) {
+        let plane = volact_floats(row + n);
+        let slope = dot(plane.xyz, ray.direction);
+        let distance = dot(plane.xyz, p) - plane.w;
+        if slope == 0.0 {
+            if distance < 0.0 { return vec2<f32>(0.0); }
+        } else if slope > 0.0 {
+            span.x = max(span.x, -distance / slope);
+        } else {
+            span.y = min(span.y, -distance / slope);
+        }
+    }
+    return span;
+}
+
+// What the clips leave of a ray inside a shape, in order.
+fn volact_spans(shape: u32, ray: VolactRay) -> VolactSpans {
+    var spans: VolactSpans;
+    spans.ends[0] = volact_block(shape, ray);
+    if spans.ends[0].x >= spans.ends[0].y { return spans; }
+    spans.count = 1u;
+    var row = volact_numbers[8u * shape + 4u].x;
+    let regions = volact_numbers[8u * shape + 4u].y;
+    for (var n = 0u; n < regions; n += 1u) {
+        let inside = volact_region(shape, ray, row);
+        let keeps = volact_numbers[row].y != 0u;
+        row += 1u + volact_numbers[row].x;
+        if keeps {
+            spans = volact_kept(spans, inside);
+        } else if inside.x < inside.y {
+            spans = volact_cut(spans, inside);
+        }
+    }
+    return spans;
+}
+
+fn volact_kept(old: VolactSpans, inside: vec2<f32>) -> VolactSpans {
+    var made: VolactSpans;
+    for (var i = 0u; i < old.count; i += 1u) {
+        let left = vec2<f32>(max(old.ends[i].x, inside.x), min(old.ends[i].y, inside.y));
+        if left.x < left.y {
+            made.ends[made.count] = left;
+            made.count += 1u;
+        }
+    }
+    return made;
+}
+
+fn volact_cut(old: VolactSpans, inside: vec2<f32>) -> VolactSpans {
+    var made: VolactSpans;
+    for (var i = 0u; i < old.count; i += 1u) {
+        let before = vec2<f32>(old.ends[i].x, min(old.ends[i].y, inside.x));
+        let after = vec2<f32>(max(old.ends[i].x, inside.y), old.ends[i].y);
+        if before.x < before.y {
+            made.ends[made.count] = before;
+            made.count += 1u;
+        }
+        if after.x < after.y && made.count < SPANS {
+            made.ends[made.count] = after;
+            made.count += 1u;
+        }
+    }
+    return made;
+}
+
+fn volact_sample(shape: u32, ray: VolactRay, t: f32, step: f32, value: f32) -> Sample {
+    let p = volact_floats(8u * shape).xyz + (ray.start + t * ray.direction);
+    return Sample(p, ray.direction, step, -ray.direction, t + volact_frame.depth_shift, value);
+}
+
+// For cells of 8³ samples how many around them, with themselves, are empty; 0 where they are not.
+@group(0) @binding(7) var<storage, read> volact_empties: array<u32>;
+
+// Up to where nothing can be seen of a shape from a place on a ray on; the place itself where that is
+// not known.
+fn volact_ahead(shape: u32, ray: VolactRay, t: f32) -> f32 {
+    let grid = volact_numbers[8u * shape + 6u];
+    if grid.y == 0u { return t; }
+    let p = vec4<f32>(volact_floats(8u * shape).xyz + (ray.start + t * ray.direction), 1.0);
+    let row = volact_numbers[8u * shape + 7u].x;
+    let x = vec3<f32>(dot(volact_floats(row), p), dot(volact_floats(row + 1u), p), dot(volact_floats(row + 2u), p));
+    let cell = clamp(vec3<i32>(floor(x / 8.0)), vec3<i32>(0), vec3<i32>(grid.yzw) - 1);
+    let at = u32(cell.x) + grid.y * (u32(cell.y) + grid.z * u32(cell.z));
+    let free = i32(volact_empties[grid.x + at]);
+    if free == 0 { return t; }
+    var left = 3.0e38;
+    for (var a = 0u; a < 3u; a += 1u) {
+        let slope = dot(volact_floats(row + a).xyz, ray.direction);
+        let end = 8.0 * f32(select(cell[a] - free + 1, cell[a] + free, slope > 0.0));
+        if slope != 0.0 { left = min(left, (end - x[a]) / slope); }
+    }
+    return t + max(left, 0.0);
+}
+
+// The segment to go on with where nothing is seen up to some place: not the last of a stretch, which is
+// a piece of its own.
+fn volact_beyond(k: i32, ahead: f32, end: f32) -> i32 {
+    return max(k, volact_first_segment(min(ahead, end)));
+}
