@@ -11,7 +11,7 @@ use volact_core::{
 use volact_shaders::{
     Program,
     gpu::{
-        Anchor, FrameNumbers, Recipe, VolumeUse, WORKGROUP, is_deep,
+        Anchor, FrameNumbers, MOST_ROWS, Recipe, VolumeUse, WORKGROUP, is_deep,
         pack::{self, Row},
         skip::Cells,
         table,
@@ -91,14 +91,13 @@ pub struct Drawn {
 
 impl Default for Drawing {
     fn default() -> Self {
-        let storage = |label| Rows::new(label, wgpu::BufferUsages::STORAGE);
         Self {
             pipelines: Pipelines::default(),
             volumes: Volumes::default(),
-            frame: Rows::new("volact frame", wgpu::BufferUsages::UNIFORM),
-            numbers: storage("volact numbers"),
-            tables: storage("volact tables"),
-            limits: storage("volact limits"),
+            frame: Rows::uniform("volact frame", size_of::<FrameNumbers>() / size_of::<Row>()),
+            numbers: Rows::uniform("volact numbers", MOST_ROWS),
+            tables: Rows::storage("volact tables"),
+            limits: Rows::storage("volact limits"),
             limited: None,
             skipping: Skipping::default(),
             laying: Laying::default(),
@@ -281,7 +280,7 @@ impl Drawing {
     fn make_target(&mut self, gpu: &Gpu, viewport: &Viewport) -> Result<(), ActionError> {
         let count = viewport.width * viewport.height;
         if 16 * count as u64 > gpu.limits.max_storage_buffer_binding_size {
-            return Err(too_large(gpu, "the picture", 16 * count as u64));
+            return Err(too_large("the picture", 16 * count as u64, gpu.limits.max_storage_buffer_binding_size));
         }
         if self.target.as_ref().is_none_or(|t| t.len() < count) {
             self.target = None;
