@@ -58,7 +58,7 @@ fn every_shader_is_a_valid_module_for_every_way_of_reading() {
 #[test]
 fn shaders_are_merged_into_one_march() {
     let mut recipes: Vec<_> = all().iter().map(|entry| recipe(entry, Some(EXACT))).collect();
-    recipes.sort_by_key(|r| !volact_shaders::gpu::is_deep(r.program.compositing()));
+    recipes.sort_by_key(|r| !gpu::is_deep(r.program.compositing()));
     let words = words(&recipes, 2, true);
     assert!(words.len() > 1000);
 }

@@ -282,7 +282,7 @@ impl Drawing {
         if 16 * count as u64 > gpu.limits.max_storage_buffer_binding_size {
             return Err(too_large("the picture", 16 * count as u64, gpu.limits.max_storage_buffer_binding_size));
         }
-        if self.target.as_ref().is_none_or(|t| t.len() < count) {
+        if self.target.as_ref().is_none_or(|t| t.room() < count) {
             self.target = None;
             self.targets += 1;
             self.target = Some(Target::new(gpu, count, self.targets));

@@ -79,7 +79,7 @@ impl Target {
     }
 
     /// Pixels that there is room for.
-    pub fn len(&self) -> usize {
+    pub fn room(&self) -> usize {
         self.count
     }
 
