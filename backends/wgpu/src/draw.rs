@@ -5,6 +5,7 @@ use std::sync::Arc;
 use volact_core::{
     Aabb, ActionError, FrameDesc, Opaque, ParameterType, ParameterValue, RayGrid, Viewport,
     frame::{FrameError, Rebuild},
+    glam::DVec3,
     resolve::ResolvedShape,
     volume::Filter,
 };
@@ -127,7 +128,7 @@ impl Drawing {
         let viewport = desc.viewport();
         let grid = desc.camera.rays(&viewport).map_err(FrameError::from)?;
         let bounds = items.iter().fold(Aabb::EMPTY, |b, i| b.union(&i.shape.world_block()));
-        let bounds = if bounds.is_empty() { Aabb::new(bounds.max, bounds.max) } else { bounds };
+        let bounds = if bounds.is_empty() { Aabb::new(DVec3::ZERO, DVec3::ZERO) } else { bounds };
         let anchor = Anchor::new(&grid, &viewport, &bounds, step);
         let recipes: Vec<Recipe> = items.iter().map(|i| self.recipe(i, settings)).collect();
         let key = key(&items, &recipes, desc)?;
