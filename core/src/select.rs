@@ -47,8 +47,12 @@ fn reasons(refused: &[(String, String)]) -> String {
 /// The reason for a preferred action that nobody registered.
 pub const NOT_REGISTERED: &str = "not registered";
 
+/// How the device of an action begins that stands for a GPU which is none: only where no other
+/// preferred action can draw is such a one taken.
+pub const SOFTWARE: &str = "software: ";
+
 /// Makes the action `named` where there is one; else the first that `config` prefers and that can
-/// draw all shapes. `options` go above those of the config.
+/// draw all shapes, those on [software](SOFTWARE) devices last. `options` go above those of the config.
 ///
 /// # Errors
 /// If the named action cannot be made or refuses a shape, or no preferred action can draw.
@@ -64,9 +68,15 @@ pub fn select(
         shapes.iter().try_for_each(|shape| action.manage(shape))?;
         return Ok(Choice { name: name.into(), action, refused: Vec::new() });
     }
-    let mut refused = Vec::new();
+    let (mut refused, mut last) = (Vec::new(), None);
     for name in &config.prefer {
         match attempt(registry, name, &config.options_of(name, options), shapes) {
+            Ok(action) if action.caps().device.starts_with(SOFTWARE) => {
+                let why = format!("runs on a device that is no GPU ({}); name it to take it", action.caps().device);
+                log::info!("action {name} is taken last: it {why}");
+                refused.push((name.clone(), why));
+                last.get_or_insert((name.clone(), action));
+            }
             Ok(action) => return Ok(Choice { name: name.clone(), action, refused }),
             Err(why) => {
                 log::info!("action {name} is not taken: {why}");
@@ -74,7 +84,11 @@ pub fn select(
             }
         }
     }
-    Err(SelectError::None { refused })
+    let taken = last.ok_or_else(|| SelectError::None { refused: std::mem::take(&mut refused) });
+    taken.map(|(name, action)| {
+        refused.retain(|(other, _)| *other != name);
+        Choice { name, action, refused }
+    })
 }
 
 fn attempt(
@@ -169,6 +183,62 @@ mod tests {
         assert_eq!((choice.name.as_str(), choice.refused.len()), ("null", 0));
         let error = select(&registry, &config, Some("nul"), &Options::new(), &[]).unwrap_err();
         assert!(error.to_string().contains("did you mean \"null\"?"));
+    }
+
+    /// Draws nothing, on a device that is none.
+    struct Software(crate::null::NullAction);
+
+    impl RenderAction for Software {
+        fn declaration(&self) -> &crate::Declaration {
+            self.0.declaration()
+        }
+        fn caps(&self) -> Caps {
+            let compositing = vec![Compositing::Over];
+            Caps { compositing, device: format!("{SOFTWARE}pipe"), overlap: true, ..Caps::default() }
+        }
+        fn manage(&mut self, shape: &Shape) -> Result<(), ActionError> {
+            self.0.manage(shape)
+        }
+        fn unmanage(&mut self, shape: &Shape) -> Result<(), ActionError> {
+            self.0.unmanage(shape)
+        }
+        fn begin_draw(&mut self, frame: &crate::FrameDesc) -> Result<(), ActionError> {
+            self.0.begin_draw(frame)
+        }
+        fn draw(&mut self, shape: &Shape) -> Result<(), ActionError> {
+            self.0.draw(shape)
+        }
+        fn end_draw(&mut self) -> Result<crate::Frame, ActionError> {
+            self.0.end_draw()
+        }
+        fn set_option(&mut self, name: &str, value: crate::ParameterValue) -> Result<(), ActionError> {
+            self.0.set_option(name, value)
+        }
+    }
+
+    #[test]
+    fn software_devices_are_taken_last() {
+        let mut registry = Registry::with_core();
+        let declaration = |name| crate::Declaration { name: String::from(name), ..crate::null::declaration() };
+        for name in ["soft", "softer"] {
+            let made = |context: &crate::Context, _: &Options| -> Result<Box<dyn RenderAction>, ActionError> {
+                Ok(Box::new(Software(crate::null::NullAction::new(context))))
+            };
+            registry.add_action(declaration(name), std::sync::Arc::new(made)).unwrap();
+        }
+        let prefer = ["soft", "null", "softer"].map(String::from).to_vec();
+        let config = Config { prefer, ..Config::default() };
+        // `null` composites nothing, so that only software is left: the first of it.
+        let choice = select(&registry, &config, None, &Options::new(), &shapes(1)).unwrap();
+        let refused: Vec<_> = choice.refused.iter().map(|(name, _)| name.as_str()).collect();
+        assert_eq!((choice.name.as_str(), refused), ("soft", vec!["null", "softer"]));
+        let choice = select(&registry, &config, None, &Options::new(), &[]).unwrap();
+        assert_eq!(
+            (choice.name.as_str(), choice.refused[0].1.as_str()),
+            ("null", "runs on a device that is no GPU (software: pipe); name it to take it")
+        );
+        let choice = select(&registry, &config, Some("softer"), &Options::new(), &shapes(1)).unwrap();
+        assert_eq!(choice.name, "softer");
     }
 
     #[test]

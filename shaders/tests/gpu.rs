@@ -20,7 +20,8 @@ fn recipe(entry: &ShaderEntry, volume: Option<VolumeUse>) -> Recipe {
 
 /// Composes, validates and writes; gives the words of SPIR-V.
 fn words(recipes: &[Recipe], spans: u32, planes: bool) -> Vec<u32> {
-    let made = compose(recipes, spans, planes).unwrap_or_else(|error| panic!("{error}"));
+    compose(recipes, spans, planes, true).unwrap_or_else(|error| panic!("watched: {error}"));
+    let made = compose(recipes, spans, planes, false).unwrap_or_else(|error| panic!("{error}"));
     let options = spv::Options { lang_version: (1, 3), ..spv::Options::default() };
     spv::write_vec(&made.module, &made.info, &options, None).unwrap()
 }
@@ -57,7 +58,7 @@ fn every_shader_is_a_valid_module_for_every_way_of_reading() {
 #[test]
 fn shaders_are_merged_into_one_march() {
     let mut recipes: Vec<_> = all().iter().map(|entry| recipe(entry, Some(EXACT))).collect();
-    recipes.sort_by_key(|r| !volact_shaders::gpu::is_deep(r.program.compositing()));
+    recipes.sort_by_key(|r| !gpu::is_deep(r.program.compositing()));
     let words = words(&recipes, 2, true);
     assert!(words.len() > 1000);
 }
@@ -111,7 +112,7 @@ fn loops_of_authors_ask_for_their_budget() {
     let source = ShaderText { file: "spin.wgsl".into(), text: text.into() };
     let declaration = Declaration::new(Kind::Shader, "spin", "1", "spins");
     let entry = ShaderEntry { declaration, compositing: Compositing::Over, source: Some(source.into()) };
-    let made = compose(&[recipe(&entry, None)], 1, false).unwrap();
+    let made = compose(&[recipe(&entry, None)], 1, false, false).unwrap();
     let asked = |name: &str| {
         let (_, f) = made.module.functions.iter().find(|(_, f)| f.name.as_deref() == Some(name)).unwrap();
         let called = f.expressions.iter().filter(|(_, e)| match e {

@@ -8,6 +8,8 @@ use volact_core::{
     Warning, WarningCode, frame::Rebuild, lifecycle::Lifecycle, resolve::ResolvedShape,
 };
 
+use volact_shaders::eval::LOOP_BUDGET;
+
 use crate::{
     check::{self, NAME, check},
     device::{DeviceError, Gpu},
@@ -44,9 +46,10 @@ struct Started {
 
 /// A shader's loop went on for too long.
 #[derive(Clone, Debug, Error)]
-#[error("shader {shader:?}: a sample took more than {} rounds of loops", volact_shaders::eval::LOOP_BUDGET)]
+#[error("shader {shader:?}: a sample took more than {rounds} rounds of loops")]
 struct Overrun {
     shader: String,
+    rounds: u32,
 }
 
 impl WgpuAction {
@@ -136,8 +139,17 @@ impl WgpuAction {
         if let Some(number) = counts.overrun {
             let shape = submitted.order.get(number).cloned().unwrap_or_default();
             let shader = drawn.iter().find(|s| s.name == shape).map(|s| s.shader.declaration.name.clone());
-            let source = Box::new(Overrun { shader: shader.unwrap_or_default() });
+            let rounds = if self.gpu.cuts_loops() { LOOP_BUDGET / 2 } else { LOOP_BUDGET };
+            let source = Box::new(Overrun { shader: shader.unwrap_or_default(), rounds });
             return Err(ActionError::Shader { shape, source });
+        }
+        if counts.cut {
+            return Err(ActionError::Limit {
+                action: NAME.into(),
+                what: "number of rounds of loops along a ray".into(),
+                found: format!("more than 65535 with a sample_distance of {step:?}"),
+                wanted: format!("fewer on adapter {:?}; take a larger sample_distance, or cpu", self.gpu.name()),
+            });
         }
         frame.warnings = drawn.iter().flat_map(|s| s.warnings.clone()).collect();
         if counts.rays == 0 && !drawn.is_empty() {

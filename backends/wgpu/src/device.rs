@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use thiserror::Error;
-use volact_core::ActionError;
+use volact_core::{ActionError, select::SOFTWARE};
 
 use crate::{check::NAME, options::Adapter};
 
@@ -73,9 +73,6 @@ pub struct Gpu {
     /// Whether it is an application's.
     shared: bool,
 }
-
-/// How the description of a device begins that stands for a GPU and is none.
-pub const SOFTWARE: &str = "software: ";
 
 /// Features that are used where they are there.
 const USEFUL: [wgpu::Features; 3] =
@@ -157,6 +154,12 @@ impl Gpu {
     /// The adapter's name.
     pub fn name(&self) -> &str {
         &self.name
+    }
+
+    /// Whether it ends loops after 65,535 rounds of all loops of an invocation together, as llvmpipe
+    /// does (`LP_MAX_TGSI_LOOP_ITERATIONS`).
+    pub fn cuts_loops(&self) -> bool {
+        self.name.starts_with("llvmpipe")
     }
 
     /// Whether it has a feature.

@@ -5,13 +5,14 @@ use std::sync::Arc;
 use volact_core::{
     Aabb, ActionError, FrameDesc, Opaque, ParameterType, ParameterValue, RayGrid, Viewport,
     frame::{FrameError, Rebuild},
+    glam::DVec3,
     resolve::ResolvedShape,
     volume::Filter,
 };
 use volact_shaders::{
     Program,
     gpu::{
-        Anchor, FrameNumbers, Recipe, VolumeUse, WORKGROUP, is_deep,
+        Anchor, FrameNumbers, MOST_ROWS, Recipe, VolumeUse, WORKGROUP, is_deep,
         pack::{self, Row},
         skip::Cells,
         table,
@@ -91,14 +92,13 @@ pub struct Drawn {
 
 impl Default for Drawing {
     fn default() -> Self {
-        let storage = |label| Rows::new(label, wgpu::BufferUsages::STORAGE);
         Self {
             pipelines: Pipelines::default(),
             volumes: Volumes::default(),
-            frame: Rows::new("volact frame", wgpu::BufferUsages::UNIFORM),
-            numbers: storage("volact numbers"),
-            tables: storage("volact tables"),
-            limits: storage("volact limits"),
+            frame: Rows::uniform("volact frame", size_of::<FrameNumbers>() / size_of::<Row>()),
+            numbers: Rows::uniform("volact numbers", MOST_ROWS),
+            tables: Rows::storage("volact tables"),
+            limits: Rows::storage("volact limits"),
             limited: None,
             skipping: Skipping::default(),
             laying: Laying::default(),
@@ -128,7 +128,7 @@ impl Drawing {
         let viewport = desc.viewport();
         let grid = desc.camera.rays(&viewport).map_err(FrameError::from)?;
         let bounds = items.iter().fold(Aabb::EMPTY, |b, i| b.union(&i.shape.world_block()));
-        let bounds = if bounds.is_empty() { Aabb::new(bounds.max, bounds.max) } else { bounds };
+        let bounds = if bounds.is_empty() { Aabb::new(DVec3::ZERO, DVec3::ZERO) } else { bounds };
         let anchor = Anchor::new(&grid, &viewport, &bounds, step);
         let recipes: Vec<Recipe> = items.iter().map(|i| self.recipe(i, settings)).collect();
         let key = key(&items, &recipes, desc)?;
@@ -281,9 +281,9 @@ impl Drawing {
     fn make_target(&mut self, gpu: &Gpu, viewport: &Viewport) -> Result<(), ActionError> {
         let count = viewport.width * viewport.height;
         if 16 * count as u64 > gpu.limits.max_storage_buffer_binding_size {
-            return Err(too_large(gpu, "the picture", 16 * count as u64));
+            return Err(too_large("the picture", 16 * count as u64, gpu.limits.max_storage_buffer_binding_size));
         }
-        if self.target.as_ref().is_none_or(|t| t.len() < count) {
+        if self.target.as_ref().is_none_or(|t| t.room() < count) {
             self.target = None;
             self.targets += 1;
             self.target = Some(Target::new(gpu, count, self.targets));

@@ -17,10 +17,10 @@ pub fn method(drawn: &[&ResolvedShape], volumes: &Volumes, step: f64, settings: 
     formats.dedup();
     let first = |s: &&ResolvedShape| s.compositing() == Compositing::First;
     let mut classification = Vec::new();
-    if drawn.iter().any(|s| !first(&s)) || drawn.is_empty() {
+    if drawn.iter().any(|s| !first(s)) || drawn.is_empty() {
         classification.push("shader evaluated in the middle of segments");
     }
-    if drawn.iter().any(|s| first(&s)) {
+    if drawn.iter().any(first) {
         classification.push("crossings found by the shader's values");
     }
     let hardware = settings.hardware && held.iter().any(|h| h.filterable);

@@ -1,7 +1,7 @@
 //! Drawing over an application's picture: into a viewport of its texture, in front of, behind and
 //! around what its depth buffer holds. Nothing is cleared, and depth is left as it is.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, hash_map::Entry};
 
 use volact_core::{ActionError, Viewport, camera::DepthRange, glam::DMat4};
 use volact_shaders::gpu::{
@@ -103,11 +103,10 @@ impl Laying {
         let [_, uniform] = self.numbers.get_or_insert_with(|| make_numbers(gpu));
         gpu.queue.write_buffer(uniform, 0, bytemuck::bytes_of(&[viewport.x as u32, viewport.y as u32, 0, 0]));
         let uniform = uniform.clone();
-        if !self.covers.contains_key(&target.format) {
-            let made = cover_pipeline(gpu, target.format)?;
-            self.covers.insert(target.format, made);
-        }
-        let Some((pipeline, layouts)) = self.covers.get(&target.format) else { return Ok(()) };
+        let (pipeline, layouts) = match self.covers.entry(target.format) {
+            Entry::Occupied(there) => there.into_mut(),
+            Entry::Vacant(free) => free.insert(cover_pipeline(gpu, target.format)?),
+        };
         let resources = vec![pixels.as_entire_binding(), uniform.as_entire_binding()];
         let groups = [group(gpu, &layouts[0], vec![frame.as_entire_binding()]), group(gpu, &layouts[1], resources)];
         let color = wgpu::RenderPassColorAttachment {

@@ -1,7 +1,7 @@
 //! From the device's pixels to a frame.
 
 use volact_core::{Frame, Viewport};
-use volact_shaders::gpu::{COUNTERS, FLAGS};
+use volact_shaders::gpu::{COUNTERS, CUT_FLAG, FLAGS};
 
 use crate::device::{DeviceError, Gpu};
 
@@ -35,6 +35,8 @@ struct Timer {
 pub struct Counts {
     /// The shape whose loop overran its budget.
     pub overrun: Option<usize>,
+    /// Whether the device has cut a loop short.
+    pub cut: bool,
     /// Samples.
     pub samples: u64,
     /// Rays that took one.
@@ -77,7 +79,7 @@ impl Target {
     }
 
     /// Pixels that there is room for.
-    pub fn len(&self) -> usize {
+    pub fn room(&self) -> usize {
         self.count
     }
 
@@ -172,6 +174,7 @@ impl Target {
         let seconds = |timer: &Timer| tick(1).saturating_sub(tick(0)) as f64 * timer.period * 1e-9;
         Counts {
             overrun: (word(0) as usize).checked_sub(1),
+            cut: word(CUT_FLAG) != 0,
             samples: sum(1),
             rays: sum(1 + COUNTERS),
             seconds: self.timer.as_ref().map(seconds),

@@ -208,14 +208,30 @@ pub struct Rows {
     usage: wgpu::BufferUsages,
     buffer: Option<wgpu::Buffer>,
     content: Vec<Row>,
+    least: u64,
     /// Changes with the buffer.
     pub generation: u64,
 }
 
 impl Rows {
-    /// No rows yet.
-    pub fn new(label: &'static str, usage: wgpu::BufferUsages) -> Self {
-        Self { label, usage: usage | wgpu::BufferUsages::COPY_DST, buffer: None, content: Vec::new(), generation: 0 }
+    /// No rows yet; a storage buffer for any number of them.
+    pub fn storage(label: &'static str) -> Self {
+        Self::new(label, wgpu::BufferUsages::STORAGE, 0)
+    }
+
+    /// No rows yet; a uniform buffer that is bound with just so much room.
+    pub fn uniform(label: &'static str, rows: usize) -> Self {
+        Self::new(label, wgpu::BufferUsages::UNIFORM, rows)
+    }
+
+    fn new(label: &'static str, usage: wgpu::BufferUsages, rows: usize) -> Self {
+        let (usage, least) = (usage | wgpu::BufferUsages::COPY_DST, (rows * size_of::<Row>()) as u64);
+        Self { label, usage, buffer: None, content: Vec::new(), least, generation: 0 }
+    }
+
+    /// Bytes that can be bound.
+    fn most(&self, gpu: &Gpu) -> u64 {
+        if self.least > 0 { self.least } else { gpu.limits.max_storage_buffer_binding_size }
     }
 
     /// Makes the device hold these rows; gives the bytes that were moved.
@@ -254,11 +270,12 @@ impl Rows {
 
     fn make_room(&mut self, gpu: &Gpu, count: usize) -> Result<(), ActionError> {
         let wanted = (count.max(1) * size_of::<Row>()) as u64;
-        if wanted > gpu.limits.max_storage_buffer_binding_size {
-            return Err(too_large(gpu, self.label, wanted));
+        let most = self.most(gpu);
+        if wanted > most {
+            return Err(too_large(self.label, wanted, most));
         }
         if self.buffer.as_ref().is_none_or(|b| b.size() < wanted) {
-            let size = wanted.next_power_of_two().min(gpu.limits.max_storage_buffer_binding_size);
+            let size = wanted.max(self.least).next_power_of_two().min(most);
             self.buffer = Some(gpu.device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some(self.label),
                 size,
@@ -284,15 +301,11 @@ impl Rows {
 }
 
 /// More than the device can bind.
-pub fn too_large(gpu: &Gpu, what: &str, found: u64) -> ActionError {
+pub fn too_large(what: &str, found: u64, most: u64) -> ActionError {
     ActionError::Limit {
         action: NAME.into(),
         what: format!("size of {what}"),
         found: format!("{found} bytes"),
-        wanted: format!(
-            "at most {} on adapter {:?}; draw a smaller picture or fewer shapes",
-            gpu.limits.max_storage_buffer_binding_size,
-            gpu.name()
-        ),
+        wanted: format!("at most {most}; draw a smaller picture or fewer shapes"),
     }
 }

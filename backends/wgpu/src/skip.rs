@@ -274,7 +274,7 @@ fn passes(gpu: &Gpu) -> Result<Passes, ActionError> {
         gpu.device.create_bind_group_layout(&descriptor)
     };
     let groups = [
-        layout(&[uniform, storage(true), storage(true)]),
+        layout(&[uniform, uniform, storage(true)]),
         layout(&[uniform, texture, storage(false), storage(false), storage(false)]),
     ];
     let layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {

@@ -61,12 +61,14 @@ pub struct Composition {
 
 /// Composes the ray-casting stage for shapes: first those that are composited in depth, then those
 /// that are a picture each, in the order in which they are laid over. `spans` is the number of
-/// stretches that clips may leave of a ray; `planes` tells that a shape may have slice planes.
+/// stretches that clips may leave of a ray; `planes` tells that a shape may have slice planes. A device
+/// that cuts loops short is `watched`: that it did is then in the flags, and authors' loops have half of
+/// their budget so that the two are told apart.
 ///
 /// # Errors
 /// If something cannot be put together, which would be a fault of this crate.
-pub fn compose(recipes: &[Recipe], spans: u32, planes: bool) -> Result<Composition, ComposeError> {
-    stage(recipes, spans, planes, &RAYS)
+pub fn compose(recipes: &[Recipe], spans: u32, planes: bool, watched: bool) -> Result<Composition, ComposeError> {
+    stage(recipes, spans, (planes, watched), &RAYS)
 }
 
 /// Composes the stages that draw slabs of shapes, all of which are composited in depth: a vertex stage
@@ -75,10 +77,15 @@ pub fn compose(recipes: &[Recipe], spans: u32, planes: bool) -> Result<Compositi
 /// # Errors
 /// As [`compose`].
 pub fn compose_slices(recipes: &[Recipe], spans: u32) -> Result<Composition, ComposeError> {
-    stage(recipes, spans, false, &SLICES)
+    stage(recipes, spans, (false, false), &SLICES)
 }
 
-fn stage(recipes: &[Recipe], spans: u32, planes: bool, texts: &[&str]) -> Result<Composition, ComposeError> {
+fn stage(
+    recipes: &[Recipe],
+    spans: u32,
+    (planes, watched): (bool, bool),
+    texts: &[&str],
+) -> Result<Composition, ComposeError> {
     let layout = Layout::new(recipes);
     let library = parse("", &[])?;
     let mut merger = Merger::default();
@@ -93,13 +100,16 @@ fn stage(recipes: &[Recipe], spans: u32, planes: bool, texts: &[&str]) -> Result
         deep.max(1),
     );
     let stage = parse(&constants, &[&[HOOKS], texts].concat())?;
+    let watch = if watched { Some(merger.shared("volact_short")?) } else { None };
     let mut import = Import::new(&stage, "");
+    import.watch(watch);
     let mut shapes = Vec::new();
     for (number, recipe) in recipes.iter().enumerate() {
-        shapes.push(Shape::import(&mut merger, recipe, number, &layout.slots[number])?);
+        shapes.push(Shape::import(&mut merger, recipe, (number, watch), &layout.slots[number])?);
     }
     for (hook, entry) in [("volact_shade", Entry::Shade), ("volact_value_of", Entry::Value)] {
-        let function = dispatch(&mut merger, &mut import, &stage, hook, entry, &shapes)?;
+        let budget = if watched { LOOP_BUDGET / 2 } else { LOOP_BUDGET };
+        let function = dispatch(&mut merger, &mut import, (&stage, hook), (entry, budget), &shapes)?;
         let handle = named(&stage, hook).ok_or_else(|| ComposeError::inner(format!("no hook {hook}")))?;
         let made = merger.module.functions.append(function, Span::UNDEFINED);
         import.substitute(handle, made);
@@ -136,10 +146,16 @@ struct Shape {
 }
 
 impl Shape {
-    fn import(merger: &mut Merger, recipe: &Recipe, number: usize, slots: &[Slot]) -> Result<Self, ComposeError> {
+    fn import(
+        merger: &mut Merger,
+        recipe: &Recipe,
+        (number, watch): (usize, Option<Handle<Function>>),
+        slots: &[Slot],
+    ) -> Result<Self, ComposeError> {
         let program = &recipe.program;
         let mut import = Import::new(program.module(), format!("s{number}_"));
         import.guard(merger.shared("volact_round")?);
+        import.watch(watch);
         let parameters = &program.declaration().parameters;
         let unit = parameters.iter().position(|p| p.name == "unit_distance").map_or(0, |i| slots[i].row);
         let lengths =
@@ -167,6 +183,7 @@ impl Shape {
             None => format!("s{number}_"),
         };
         let mut imports: Vec<_> = accessors.iter().enumerate().map(|(i, a)| Import::new(a, prefix(i))).collect();
+        imports.iter_mut().for_each(|import| import.watch(watch));
         for (handle, _) in program.module().functions.iter() {
             let Some(stub) = program.stub(handle) else { continue };
             let (place, name) = match stub {
@@ -240,9 +257,8 @@ fn accessor(derived: Derived, module: &Module, stub: Handle<Function>) -> &'stat
 fn dispatch(
     merger: &mut Merger,
     import: &mut Import<'_>,
-    stage: &Module,
-    hook: &str,
-    entry: Entry,
+    (stage, hook): (&Module, &str),
+    (entry, budget): (Entry, u32),
     shapes: &[Shape],
 ) -> Result<Function, ComposeError> {
     let handle = named(stage, hook).ok_or_else(|| ComposeError::inner(format!("no hook {hook}")))?;
@@ -277,7 +293,7 @@ fn dispatch(
         cases.push(SwitchCase { value: SwitchValue::U32(number as u32), body, fall_through: false });
     }
     cases.push(SwitchCase { value: SwitchValue::Default, body: Block::new(), fall_through: false });
-    begin(merger, &mut made, shape)?;
+    begin(merger, &mut made, shape, budget)?;
     made.body.push(Statement::Switch { selector: shape, cases }, Span::UNDEFINED);
     let zero = made.expressions.append(Expression::ZeroValue(result), Span::UNDEFINED);
     made.body.push(Statement::Return { value: Some(zero) }, Span::UNDEFINED);
@@ -313,14 +329,14 @@ fn converted(
 const PLAIN_MEMBERS: usize = 6;
 
 /// Fills the budget of loops, and says whose it is.
-fn begin(merger: &Merger, made: &mut Function, shape: Handle<Expression>) -> Result<(), ComposeError> {
+fn begin(merger: &Merger, made: &mut Function, shape: Handle<Expression>, budget: u32) -> Result<(), ComposeError> {
     let variable = |name: &str| {
         let mut all = merger.module.global_variables.iter();
         let found = all.find(|(_, v)| v.name.as_deref() == Some(name)).map(|(handle, _)| handle);
         found.ok_or_else(|| ComposeError::inner(format!("no variable {name}")))
     };
     let (rounds, current) = (variable("volact_rounds")?, variable("volact_shape")?);
-    let budget = made.expressions.append(Expression::Literal(Literal::U32(LOOP_BUDGET)), Span::UNDEFINED);
+    let budget = made.expressions.append(Expression::Literal(Literal::U32(budget)), Span::UNDEFINED);
     for (variable, value) in [(rounds, budget), (current, shape)] {
         let pointer = made.expressions.append(Expression::GlobalVariable(variable), Span::UNDEFINED);
         made.body.push(Statement::Store { pointer, value }, Span::UNDEFINED);

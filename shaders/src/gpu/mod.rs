@@ -10,9 +10,9 @@
 //!    [`onto`] how a picture is laid over an application's.
 //!
 //! # Bindings
-//! Group 0: 0 the frame ([`FrameNumbers`], uniform), 1 rows of numbers, 2 rows of tables, 3 what the
+//! Group 0: 0 the frame ([`FrameNumbers`], uniform), 1 rows of numbers (uniform), 2 rows of tables, 3 what the
 //! application has drawn, 4 pixels, 5 depths, 6 flags: the shape whose loop overran its budget, plus 1;
-//! then 64 counts of samples and 64 of rays; 7 what can be skipped. Group 1: 0 a sampler, then the
+//! then 64 counts of samples and 64 of rays, and whether the device has cut a loop short; 7 what can be skipped. Group 1: 0 a sampler, then the
 //! volumes' textures.
 //!
 //! All numbers are f32 in [local space](crate::signatures), the origin near the shape.
@@ -40,7 +40,13 @@ pub const SHAPE_ROWS: u32 = 8;
 pub const COUNTERS: usize = 64;
 
 /// Words of the flags' buffer.
-pub const FLAGS: usize = 1 + 2 * COUNTERS;
+pub const FLAGS: usize = 2 + 2 * COUNTERS;
+
+/// The flag that is not 0 where the device has cut a loop short.
+pub const CUT_FLAG: usize = 1 + 2 * COUNTERS;
+
+/// Rows of numbers that a module can read.
+pub const MOST_ROWS: usize = 4096;
 
 /// Invocations of a workgroup along each axis.
 pub const WORKGROUP: u32 = 8;

@@ -44,9 +44,9 @@ struct VolactFrame {
 }
 
 @group(0) @binding(0) var<uniform> volact_frame: VolactFrame;
-@group(0) @binding(1) var<storage, read> volact_numbers: array<vec4<u32>>;
+@group(0) @binding(1) var<uniform> volact_numbers: array<vec4<u32>, 4096>;
 @group(0) @binding(2) var<storage, read> volact_tables: array<vec4<u32>>;
-@group(0) @binding(6) var<storage, read_write> volact_flags: array<atomic<u32>, 129>;
+@group(0) @binding(6) var<storage, read_write> volact_flags: array<atomic<u32>, 130>;
 
 // Rounds that loops of shaders may still go for this sample, and the shape that is evaluated.
 var<private> volact_rounds: u32;
@@ -67,6 +67,9 @@ fn volact_round() -> bool {
     volact_rounds -= 1u;
     return false;
 }
+
+// Told of a loop that ended without having been left.
+fn volact_short() { atomicMax(&volact_flags[129], 1u); }
 
 // -ln(1 - a): by the series of the inverse hyperbolic tangent up to one half, where the first term
 // left out is below 1e-8 of the sum; infinite for 1.

@@ -1,5 +1,7 @@
 //! The same picture as the reference on the lattice of rays.
 
+use std::slice::from_ref;
+
 use volact_conformance::{
     metrics::within,
     scene::{ball, colors, lut, lut_of, placed, shaded, square, volume},
@@ -49,8 +51,8 @@ fn agree(what: &str, shapes: &[Shape], desc: &FrameDesc) {
 #[test]
 fn tables_through_all_cameras() {
     let shape = lut_of(&a_ball(), warm(), 1.0);
-    agree("orthographic", &[shape.clone()], &view());
-    agree("perspective", &[shape.clone()], &near());
+    agree("orthographic", from_ref(&shape), &view());
+    agree("perspective", from_ref(&shape), &near());
     let inside = Camera::perspective(DVec3::splat(4.0), DVec3::new(0.0, 9.0, 5.0), DVec3::Z, 80.0);
     agree("inside", &[shape], &FrameDesc::new(inside, 16, 16));
 }
@@ -87,7 +89,7 @@ fn every_built_in_shader() {
 fn surfaces_of_values() {
     let surfaces = colors(&[(30.0, [1.0, 0.4, 0.1], 0.4), (90.0, [0.3, 0.8, 0.2], 0.7)]);
     let shape = Shape::around_texture(&a_ball(), Appearance::new("isosurface").with("surfaces", surfaces));
-    agree("isosurface", &[shape.clone()], &near());
+    agree("isosurface", from_ref(&shape), &near());
     agree("isosurface in a table's haze", &[shape, lut_of(&a_ball(), cold(), 4.0)], &near());
 }
 
@@ -116,7 +118,7 @@ fn regions_clips_and_slices() {
     shape.set_transform(DAffine3::from_rotation_y(0.3));
     agree("clipped shape", &[shape], &view());
     let shape = lut_of(&a_ball(), warm(), 1.0);
-    agree("clipped scene", &[shape.clone()], &near().with_clip(Clip::new([plane, hole])));
+    agree("clipped scene", from_ref(&shape), &near().with_clip(Clip::new([plane, hole])));
     for style in [SliceStyle::Opaque, SliceStyle::Blended] {
         for volume in [false, true] {
             let planes = [(DVec3::Y, 3.3), (DVec3::X, 4.7)].map(|(n, at)| Plane::new(n * at, n).unwrap());

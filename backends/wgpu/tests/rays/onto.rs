@@ -137,8 +137,8 @@ fn over(frame: &Frame, inside: Viewport) -> Vec<[f64; 4]> {
 }
 
 fn same(found: &[[u8; 4]], wanted: &[[f64; 4]]) {
-    // A step of the target's 8 bits either way: the background is rounded before it is blended.
-    let near = |(a, b): (&[u8; 4], &[f64; 4])| (0..4).all(|c| (f64::from(a[c]) - b[c]).abs() <= 1.01);
+    // Half a step of the target's 8 bits each for the background, the colour, what is left, and the sum.
+    let near = |(a, b): (&[u8; 4], &[f64; 4])| (0..4).all(|c| (f64::from(a[c]) - b[c]).abs() <= 2.01);
     let wrong = found.iter().zip(wanted).filter(|pair| !near((pair.0, pair.1))).count();
     assert_eq!((wrong, found.len()), (0, wanted.len()));
 }
