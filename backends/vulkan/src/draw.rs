@@ -14,7 +14,7 @@ use volact_core::{
 use volact_shaders::{
     Program,
     gpu::{
-        Anchor, FrameNumbers, Layout, Recipe, VolumeUse, compose_slices,
+        Anchor, FrameNumbers, Layout, MOST_ROWS, Recipe, VolumeUse, compose_slices,
         pack::{self, Row},
         table,
         voxels::Units,
@@ -118,7 +118,7 @@ impl Drawing {
             cache: Cache::new(gpu, settings.cache.clone())?,
             volumes: Volumes::new(gpu)?,
             frame: Rows::new("volact frame", vk::BufferUsageFlags::UNIFORM_BUFFER),
-            numbers: storage("volact numbers"),
+            numbers: Rows::uniform("volact numbers", MOST_ROWS),
             tables: storage("volact tables"),
             limits: storage("volact limits"),
             limit_rows: Vec::new(),

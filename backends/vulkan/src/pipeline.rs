@@ -16,7 +16,7 @@ use crate::{
 pub const CORNER: u32 = 24;
 
 /// Bindings of group 0 that shaders see as storage buffers.
-const STORAGE: [u32; 5] = [1, 2, 3, 4, 6];
+const STORAGE: [u32; 4] = [2, 3, 4, 6];
 
 /// Why a module has no pipeline.
 #[derive(Debug, Error)]
@@ -240,7 +240,7 @@ impl Pipeline {
 
 fn frame_bindings() -> Vec<(u32, vk::DescriptorType)> {
     let storage = STORAGE.iter().map(|b| (*b, vk::DescriptorType::STORAGE_BUFFER));
-    std::iter::once((0, vk::DescriptorType::UNIFORM_BUFFER)).chain(storage).collect()
+    [0, 1].map(|b| (b, vk::DescriptorType::UNIFORM_BUFFER)).into_iter().chain(storage).collect()
 }
 
 fn volume_bindings(textures: u32) -> Vec<(u32, vk::DescriptorType)> {

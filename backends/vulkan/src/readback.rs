@@ -50,7 +50,7 @@ impl Target {
     pub fn new(gpu: &Arc<Gpu>, count: usize, generation: u64) -> Result<Self, ActionError> {
         use vk::BufferUsageFlags as U;
         let bytes = LIGHT * count as u64;
-        within(gpu, "the picture", bytes)?;
+        within(gpu, "the picture", (bytes, 0))?;
         let usage = U::STORAGE_BUFFER | U::TRANSFER_SRC | U::TRANSFER_DST;
         Ok(Self {
             light: Buffer::new(gpu, "volact light", bytes, usage, Place::Device)?,

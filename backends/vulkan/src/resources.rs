@@ -252,6 +252,8 @@ fn check(
 pub struct Rows {
     what: &'static str,
     usage: vk::BufferUsageFlags,
+    /// Bytes that are bound in any case; 0 where as many are as there are.
+    least: u64,
     buffer: Option<Buffer>,
     content: Vec<Row>,
     /// Changes with the buffer.
@@ -261,7 +263,13 @@ pub struct Rows {
 impl Rows {
     /// No rows yet.
     pub fn new(what: &'static str, usage: vk::BufferUsageFlags) -> Self {
-        Self { what, usage, buffer: None, content: Vec::new(), generation: 0 }
+        Self { what, usage, least: 0, buffer: None, content: Vec::new(), generation: 0 }
+    }
+
+    /// No rows yet; a uniform buffer that is bound with just so much room.
+    pub fn uniform(what: &'static str, rows: usize) -> Self {
+        let least = (rows * size_of::<Row>()) as u64;
+        Self { least, ..Self::new(what, vk::BufferUsageFlags::UNIFORM_BUFFER) }
     }
 
     /// Makes the device hold these rows; gives the bytes that were moved. The device must not be drawing.
@@ -269,8 +277,8 @@ impl Rows {
     /// # Errors
     /// If there are more than the device can bind.
     pub fn set(&mut self, gpu: &Arc<Gpu>, rows: Vec<Row>) -> Result<usize, ActionError> {
-        let wanted = size_of_val::<[Row]>(&rows) as u64;
-        within(gpu, self.what, wanted)?;
+        let wanted = (size_of_val::<[Row]>(&rows) as u64).max(self.least);
+        within(gpu, self.what, (wanted, self.least))?;
         if self.buffer.as_ref().is_none_or(|b| b.size() < wanted) {
             self.buffer = None;
             let room = wanted.next_power_of_two();
@@ -301,12 +309,13 @@ impl Rows {
     }
 }
 
-/// Refuses what the device cannot bind as one buffer.
+/// Refuses what the device cannot bind as one buffer, or what has more than its room, where that is
+/// given.
 ///
 /// # Errors
 /// By name, with what the device can.
-pub fn within(gpu: &Gpu, what: &str, bytes: u64) -> Result<(), ActionError> {
-    let most = u64::from(gpu.limits.max_storage_buffer_range);
+pub fn within(gpu: &Gpu, what: &str, (bytes, room): (u64, u64)) -> Result<(), ActionError> {
+    let most = if room > 0 { room } else { u64::from(gpu.limits.max_storage_buffer_range) };
     if bytes <= most {
         return Ok(());
     }

@@ -46,7 +46,7 @@ pub unsafe fn log<S: Simd>(u: S::F, add: S::F) -> S::F {
 /// Taylor's series to r⁷, to 1e-8 for |r| ≤ ln 2 / 2.
 ///
 /// # Safety
-/// As [`log`].
+/// As [`log()`].
 #[inline(always)]
 pub unsafe fn exp_parts<S: Simd>(y: S::F) -> (S::F, S::F) {
     // SAFETY: the caller's promise.
@@ -66,7 +66,7 @@ pub unsafe fn exp_parts<S: Simd>(y: S::F) -> (S::F, S::F) {
 /// Numbers of 0 to 1 to a power that is not negative: e^(y·ln x); 0⁰ = 1.
 ///
 /// # Safety
-/// As [`log`].
+/// As [`log()`].
 #[inline(always)]
 pub unsafe fn power<S: Simd>(x: S::F, exponent: f32) -> S::F {
     // SAFETY: the caller's promise; what is too small to be seen is not taken further down.
