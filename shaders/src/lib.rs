@@ -19,13 +19,17 @@ pub mod eval;
 pub mod gpu;
 pub mod plain;
 mod program;
+mod programs;
 mod refuse;
 pub mod signatures;
 pub mod source;
 mod tokens;
+mod unfit;
 
 pub use builtin::{Native, builtin, does, recognise};
 pub use error::{ShaderError, SourceError, SourceErrors};
 pub use eval::{Environment, Kernel, Machine};
 pub use program::{Entry, Program};
+pub use programs::Programs;
 pub use source::{load, load_folder};
+pub use unfit::unfit;

@@ -28,21 +28,26 @@ use volact::{
 #[expect(unsafe_code, reason = "links plugins through their entries")]
 fn linked() -> Registry {
     let mut registry = Registry::with_core();
-    // SAFETY: both entries are made by the macro.
-    let loaded = unsafe {
-        [volact_cpu_plugin::volact_plugin, volact_files_plugin::volact_plugin]
-            .map(|entry| host::link(entry, &mut registry))
-    };
-    let [cpu, files] = loaded.map(Result::unwrap);
+    let entries = [
+        volact_cpu_plugin::volact_plugin,
+        volact_files_plugin::volact_plugin,
+        volact_wgpu_plugin::volact_plugin,
+        volact_vulkan_plugin::volact_plugin,
+    ];
+    // SAFETY: all entries are made by the macro.
+    let loaded = entries.map(|entry| unsafe { host::link(entry, &mut registry) });
+    let [cpu, files, wgpu, vulkan] = loaded.map(Result::unwrap);
     assert_eq!((cpu.name.as_str(), cpu.registered.len()), ("volact_cpu_plugin", 2));
     assert_eq!((files.name.as_str(), files.registered.len()), ("volact_files_plugin", volact_files::loaders().len()));
+    assert_eq!((wgpu.name.as_str(), wgpu.registered.len()), ("volact_wgpu_plugin", 1));
+    assert_eq!((vulkan.name.as_str(), vulkan.registered.len()), ("volact_vulkan_plugin", 1));
     registry
 }
 
 /// The same of libraries that are loaded.
 fn loaded() -> Registry {
     let mut registry = Registry::with_core();
-    ["volact-cpu-plugin", "volact-files-plugin"]
+    ["volact-cpu-plugin", "volact-files-plugin", "volact-wgpu-plugin", "volact-vulkan-plugin"]
         .iter()
         .for_each(|package| library::load_library(package, &mut registry));
     registry
@@ -201,6 +206,37 @@ fn one_action_follows_changes_from_frame_to_frame() {
         frames(&mut actions, &[&other]);
         let caps = actions.each_ref().map(|action| action.caps());
         assert_eq!(caps[0], caps[1], "{way}");
+    }
+}
+
+/// Where there is no GPU and no software for one, the errors have the same words.
+#[test]
+fn pictures_of_gpus_are_the_same() {
+    let direct = Registry::with_builtins();
+    let shape = block();
+    let desc = FrameDesc::fit(&shape, View::Iso, 24, 20);
+    for action in ["wgpu", "vulkan"] {
+        let drawn = |registry: &Registry| -> Result<Frame, ActionError> {
+            let mut action = registry.action(action, &Options::new())?;
+            action.manage(&shape)?;
+            action.begin_draw(&desc)?;
+            action.draw(&shape)?;
+            action.end_draw()
+        };
+        let wanted = drawn(&direct).map_err(|e| said(&e));
+        for (way, registry) in behind() {
+            match (&wanted, drawn(registry).map_err(|e| said(&e))) {
+                (Ok(wanted), Ok(found)) => {
+                    assert!(bits(wanted) == bits(&found), "{action}, {way}: another picture");
+                    assert_eq!((&wanted.method, &wanted.warnings), (&found.method, &found.warnings), "{action}, {way}");
+                    assert!(wanted.color.iter().any(|c| c[3] > 0.0), "{action}: an empty picture");
+                }
+                (wanted, found) => {
+                    assert_eq!(wanted.as_ref().err(), found.as_ref().err(), "{action}, {way}");
+                    println!("skipped {action}: {found:?}");
+                }
+            }
+        }
     }
 }
 

@@ -2,19 +2,20 @@
 
 use std::{collections::BTreeSet, sync::Arc, time::Instant};
 
-use thiserror::Error;
 use volact_core::{
     ActionError, Caps, Context, Declaration, Frame, FrameDesc, Method, Options, ParameterValue, RenderAction, Severity,
     Shape, Warning, WarningCode, frame::Rebuild, lifecycle::Lifecycle, resolve::ResolvedShape,
 };
-use volact_shaders::gpu::voxels::Texel;
+use volact_shaders::{
+    Programs,
+    gpu::scene::{Item, cut_short, overrun},
+};
 
 use crate::{
     check::{self, NAME, check},
     device::Gpu,
-    draw::{Drawing, Drawn, Item},
+    draw::{Drawing, Drawn},
     options::{Settings, declaration},
-    programs::Programs,
 };
 
 /// Draws on a GPU through Vulkan.
@@ -41,13 +42,6 @@ struct Fetched {
     rebuilt: Vec<Rebuild>,
 }
 
-/// A shader's loop went on for too long.
-#[derive(Clone, Debug, Error)]
-#[error("shader {shader:?}: a sample took more than {} rounds of loops", volact_shaders::eval::LOOP_BUDGET)]
-struct Overrun {
-    shader: String,
-}
-
 impl VulkanAction {
     /// Makes one with a device of its own, from options that are checked and complete.
     ///
@@ -60,7 +54,7 @@ impl VulkanAction {
             declaration: declaration(),
             given: options.clone(),
             lifecycle: Lifecycle::new(context.clone()),
-            programs: Programs::default(),
+            programs: Programs::new(NAME),
             drawing: Drawing::new(&gpu, &settings)?,
             settings,
             gpu,
@@ -85,7 +79,10 @@ impl VulkanAction {
         if let Some((target, limits)) = self.drawing.target() {
             let counts = target.read(&mut frame, &desc.viewport(), made.shift, desc.depth_threshold, limits);
             if let Some(number) = counts.overrun {
-                return Err(overrun(&made, drawn, number));
+                return Err(overrun(made.order.get(number), drawn, self.gpu.cuts_loops()));
+            }
+            if counts.cut {
+                return Err(cut_short(NAME, self.gpu.name(), made.step.distance));
             }
             (frame.statistics.rays, frame.statistics.samples) = (counts.rays, counts.samples);
             frame.statistics.resident_bytes = self.drawing.bytes() + target.bytes();
@@ -132,7 +129,7 @@ impl VulkanAction {
             ParameterValue::Volume(texture) => self.drawing.volumes.get(texture.volume()),
             _ => None,
         });
-        let mut formats: Vec<String> = held.map(|h| format_name(h.encoding.texel, h.encoding.channels)).collect();
+        let mut formats: Vec<String> = held.map(|h| h.encoding.name()).collect();
         formats.sort();
         formats.dedup();
         Method {
@@ -147,23 +144,6 @@ impl VulkanAction {
             device: self.gpu.description(),
         }
     }
-}
-
-fn format_name(texel: Texel, channels: usize) -> String {
-    let channels = ["", "r", "rg", "rgb", "rgba"][channels];
-    let texel = match texel {
-        Texel::Unorm8 => "8",
-        Texel::Unorm16 => "16",
-        Texel::Float16 => "16f",
-        Texel::Float32 => "32f",
-    };
-    format!("{channels}{texel}")
-}
-
-fn overrun(made: &Drawn, drawn: &[&ResolvedShape], number: usize) -> ActionError {
-    let shape = made.order.get(number).cloned().unwrap_or_default();
-    let shader = drawn.iter().find(|s| s.name == shape).map(|s| s.shader.declaration.name.clone());
-    ActionError::Shader { shape, source: Box::new(Overrun { shader: shader.unwrap_or_default() }) }
 }
 
 impl RenderAction for VulkanAction {

@@ -3,13 +3,10 @@
 use volact_core::{
     ActionError, Caps, Compositing, ParameterValue, TableInterpolation, resolve::ResolvedShape, slicing::SlicingError,
 };
-use volact_shaders::Program;
+use volact_shaders::{Program, unfit};
 
 /// The action's name.
 pub const NAME: &str = "vulkan";
-
-/// The most stretches that clips may leave of a ray.
-pub const SPANS: u32 = 16;
 
 const INSTEAD: &str = "draw it with the action cpu";
 
@@ -63,14 +60,7 @@ fn refused(shape: &ResolvedShape, program: &Program) -> Option<(String, &'static
             _ => {}
         }
     }
-    let component = shape.int("component").filter(|_| program.declaration().parameter("component").is_some());
-    let wanted = component.map_or(0, |c| usize::try_from(c).unwrap_or(usize::MAX));
-    shape.parameters.iter().find_map(|(name, value)| {
-        let ParameterValue::Volume(texture) = value else { return None };
-        let count = texture.volume().desc().components;
-        let what = format!("component {wanted} of parameter {name:?} with {count}");
-        (wanted >= count).then_some((what, "name a component that is there"))
-    })
+    unfit(shape, program)
 }
 
 /// The error of a limit that is passed.

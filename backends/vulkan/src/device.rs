@@ -8,7 +8,8 @@ use std::{
 use ash::{ext, vk};
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 use thiserror::Error;
-use volact_core::ActionError;
+use volact_core::{ActionError, select::SOFTWARE};
+use volact_shaders::gpu::scene::cuts_loops;
 
 use crate::check::NAME;
 
@@ -147,7 +148,13 @@ impl Gpu {
         let [api, driver] = [self.properties.api_version, self.properties.driver_version];
         let version =
             |v| format!("{}.{}.{}", vk::api_version_major(v), vk::api_version_minor(v), vk::api_version_patch(v));
-        format!("{} (Vulkan {}, driver {})", self.name, version(api), version(driver))
+        let software = if self.properties.device_type == vk::PhysicalDeviceType::CPU { SOFTWARE } else { "" };
+        format!("{software}{} (Vulkan {}, driver {})", self.name, version(api), version(driver))
+    }
+
+    /// See [`cuts_loops`].
+    pub fn cuts_loops(&self) -> bool {
+        cuts_loops(&self.name)
     }
 
     /// The families that share what both queues touch.

@@ -33,7 +33,6 @@ mod memory;
 pub mod options;
 #[expect(unsafe_code, reason = "Vulkan is called")]
 mod pipeline;
-mod programs;
 mod readback;
 mod resources;
 mod runs;

@@ -7,7 +7,7 @@ use volact_core::{
     parameter::Kind,
     slicing::{Rate, Sampling},
 };
-use volact_shaders::gpu::voxels::{Texel, Wanted};
+use volact_shaders::gpu::voxels::Wanted;
 
 use crate::check::NAME;
 
@@ -67,7 +67,7 @@ pub fn declaration() -> Declaration {
         )
         .with(choice(
             "format",
-            &["auto", "r8", "r16", "r16f", "r32f"],
+            &Wanted::WORDS,
             "how voxels lie in textures; auto takes the smallest that holds them to the bit, or r32f",
         ))
         .with(choice(
@@ -104,13 +104,7 @@ impl Settings {
         Self {
             sampling: Sampling { rate, most_planes, ..Sampling::default() },
             termination: number("termination").unwrap_or(TERMINATION),
-            format: match word("format") {
-                "r8" => Wanted::Texel(Texel::Unorm8),
-                "r16" => Wanted::Texel(Texel::Unorm16),
-                "r16f" => Wanted::Texel(Texel::Float16),
-                "r32f" => Wanted::Texel(Texel::Float32),
-                _ => Wanted::Exact,
-            },
+            format: Wanted::named(word("format")),
             hardware: word("filter") == "hardware",
             adapter: word("adapter").into(),
             validation: options.get("validation") == Some(&ParameterValue::Bool(true)),

@@ -179,6 +179,11 @@ impl Volumes {
         Ok(())
     }
 
+    /// How a volume that was prepared is encoded, and whether the device's sampler may interpolate it.
+    pub fn held(&self, volume: &Volume) -> Option<(Encoding, bool)> {
+        self.get(volume).map(|held| (held.encoding, held.filterable))
+    }
+
     /// A volume that was prepared.
     pub fn get(&self, volume: &Volume) -> Option<&Held> {
         self.held.get(&volume.id())
@@ -223,28 +228,16 @@ fn check(
     encoding: &Encoding,
     format: vk::Format,
 ) -> Result<(), ActionError> {
-    let most = gpu.limits.max_image_dimension3_d as usize;
-    let dims = volume.dims();
-    if dims.iter().any(|n| *n > most) {
-        let found = format!("{} × {} × {}", dims[0], dims[1], dims[2]);
-        let wanted =
-            format!("at most {most} samples along an axis on adapter {:?}; reduce it, or take cpu", gpu.name());
-        return Err(limit(format!("size of volume {:?}", volume.name()), found, wanted));
+    encoding.check((NAME, &shape.name), volume, (gpu.name(), gpu.limits.max_image_dimension3_d))?;
+    if gpu.samples(format, false) {
+        return Ok(());
     }
-    let unsupported = |what: String, cure: &str| {
-        Err(ActionError::Unsupported { action: NAME.into(), shape: shape.name.clone(), what, cure: cure.into() })
-    };
-    if !gpu.samples(format, false) {
-        let what = format!("images of format {format:?} on adapter {:?}", gpu.name());
-        return unsupported(what, "set the option format to another");
-    }
-    let (scalar, bytes) = (volume.desc().scalar, volume.data().bytes());
-    let all_numbers = || (0..bytes.len() / scalar.size()).all(|i| scalar.read(bytes, i).is_finite());
-    if scalar.is_float() && !encoding.holds_nan() && !all_numbers() {
-        let what = format!("samples of volume {:?} that are no numbers in a format of whole numbers", volume.name());
-        return unsupported(what, "set the option format to auto or r32f");
-    }
-    Ok(())
+    Err(ActionError::Unsupported {
+        action: NAME.into(),
+        shape: shape.name.clone(),
+        what: format!("images of format {format:?} on adapter {:?}", gpu.name()),
+        cure: "set the option format to another".into(),
+    })
 }
 
 /// Rows on the device and what they hold.

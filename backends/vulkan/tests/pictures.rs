@@ -3,12 +3,15 @@
 //! Where there is no Vulkan at all, each test says so and ends. Where there is, the layers have to be
 //! installed, and whatever they say fails the test.
 
+use std::sync::Arc;
+
 use volact_core::{
-    Aabb, ActionError, Appearance, Camera, Clip, ControlPoint, Frame, FrameDesc, LookupTable, Opaque, OpaqueDepth,
-    Options, Plane, Projection, Registry, RenderAction, ScalarType, Shape, Sphere, TableInterpolation, Viewport,
-    Volume, VolumeDesc, WarningCode,
+    Aabb, ActionError, Appearance, Camera, Clip, Compositing, ControlPoint, Declaration, Frame, FrameDesc, LookupTable,
+    Opaque, OpaqueDepth, Options, ParameterDecl, ParameterType, Plane, Projection, Registry, RenderAction, ScalarType,
+    ShaderEntry, ShaderText, Shape, Sphere, TableInterpolation, Viewport, Volume, VolumeDesc, WarningCode,
     geometry::ClipRegion,
     glam::{DAffine3, DVec3},
+    parameter::Kind,
     resolve::ResolvedShape,
 };
 use volact_cpu::reference::{Method, ReferenceOptions, integrate};
@@ -263,6 +266,64 @@ fn pipelines_are_kept_on_disk_and_damaged_files_left_aside() {
         assert!(std::fs::metadata(&file).unwrap().len() >= 32);
     }
     assert_eq!(std::fs::read_dir(&path).unwrap().count(), 1);
+}
+
+/// A registry with a shader of this text, and a block of its look.
+fn written(text: &str) -> (Registry, Shape) {
+    let mut all = registry();
+    let declaration = Declaration::new(Kind::Shader, "written", "1", "for a test")
+        .with(ParameterDecl::new("volume", ParameterType::Volume, "data").required());
+    let source = Some(Arc::new(ShaderText { file: "written.wgsl".into(), text: text.into() }));
+    all.add_shader(ShaderEntry { declaration, compositing: Compositing::Over, source }).unwrap();
+    (all, Shape::around(&data(ScalarType::U8), Appearance::new("written")))
+}
+
+fn try_in(registry: &Registry, shape: &Shape, step: f64) -> Option<Result<Frame, ActionError>> {
+    action(&[])?;
+    let options = [("validation".to_owned(), true.into()), ("sample_distance".to_owned(), step.into())];
+    let mut action = registry.action("vulkan", &options.into()).unwrap();
+    action.manage(shape).unwrap();
+    action.begin_draw(&views()[2]).unwrap();
+    action.draw(shape).unwrap();
+    Some(action.end_draw())
+}
+
+#[test]
+fn loops_without_end_are_an_error_that_names_the_shader() {
+    let (registry, shape) = written(
+        "fn shade(s: Sample) -> Medium {
+            var n = 0.0;
+            loop { n += 1.0; if n < 0.0 { break; } }
+            return Medium(vec3<f32>(n), 1.0);
+        }",
+    );
+    let Some(drawn) = try_in(&registry, &shape, 1.0) else { return };
+    let error = drawn.unwrap_err();
+    let source = std::error::Error::source(&error).unwrap().to_string();
+    assert!(source.contains("written") && source.contains("rounds of loops"), "{error}: {source}");
+}
+
+#[test]
+fn loops_within_the_budget_are_right() {
+    let (registry, shape) = written(
+        "fn shade(s: Sample) -> Medium {
+            var sum = 0.0;
+            for (var i = 0; i < 100; i++) { if i % 2 == 0 { continue; } sum += 0.01; }
+            return Medium(vec3<f32>(sum), 0.1);
+        }",
+    );
+    let Some(drawn) = try_in(&registry, &shape, 0.3) else { return };
+    let frame = drawn.unwrap();
+    let middle = frame.pixel(24, 20);
+    assert!(middle[3] > 0.3 && (middle[0] / middle[3] - 0.5).abs() < 1e-5, "{middle:?}");
+}
+
+/// What `select` knows an adapter that is no GPU by.
+#[test]
+fn software_says_that_it_is() {
+    let Some(action) = action(&[]) else { return };
+    let device = action.caps().device;
+    assert_eq!(device.contains("llvmpipe"), device.starts_with("software: "), "{device}");
 }
 
 #[test]

@@ -2,23 +2,23 @@
 
 use std::{collections::BTreeSet, time::Instant};
 
-use thiserror::Error;
 use volact_core::{
     ActionError, Caps, Context, Declaration, Frame, FrameDesc, Options, ParameterValue, RenderAction, Severity, Shape,
     Warning, WarningCode, frame::Rebuild, lifecycle::Lifecycle, resolve::ResolvedShape,
 };
-
-use volact_shaders::eval::LOOP_BUDGET;
+use volact_shaders::{
+    Programs,
+    gpu::scene::{Item, cut_short, overrun},
+};
 
 use crate::{
     check::{self, NAME, check},
     device::{DeviceError, Gpu},
-    draw::{Drawing, Item},
+    draw::Drawing,
     method,
     onto::Onto,
     options::{Settings, declaration},
     plan,
-    programs::Programs,
 };
 
 /// Draws on a GPU.
@@ -42,14 +42,6 @@ struct Started {
     at: Instant,
     uploaded: usize,
     rebuilt: Vec<Rebuild>,
-}
-
-/// A shader's loop went on for too long.
-#[derive(Clone, Debug, Error)]
-#[error("shader {shader:?}: a sample took more than {rounds} rounds of loops")]
-struct Overrun {
-    shader: String,
-    rounds: u32,
 }
 
 impl WgpuAction {
@@ -77,7 +69,7 @@ impl WgpuAction {
             settings,
             lifecycle: Lifecycle::new(context.clone()),
             gpu,
-            programs: Programs::default(),
+            programs: Programs::new(NAME),
             drawing: Drawing::default(),
             started: None,
             said: BTreeSet::new(),
@@ -137,19 +129,10 @@ impl WgpuAction {
             None => target.read(&self.gpu, &mut frame, &open.desc.viewport(), submitted.shift)?,
         };
         if let Some(number) = counts.overrun {
-            let shape = submitted.order.get(number).cloned().unwrap_or_default();
-            let shader = drawn.iter().find(|s| s.name == shape).map(|s| s.shader.declaration.name.clone());
-            let rounds = if self.gpu.cuts_loops() { LOOP_BUDGET / 2 } else { LOOP_BUDGET };
-            let source = Box::new(Overrun { shader: shader.unwrap_or_default(), rounds });
-            return Err(ActionError::Shader { shape, source });
+            return Err(overrun(submitted.order.get(number), &drawn, self.gpu.cuts_loops()));
         }
         if counts.cut {
-            return Err(ActionError::Limit {
-                action: NAME.into(),
-                what: "number of rounds of loops along a ray".into(),
-                found: format!("more than 65535 with a sample_distance of {step:?}"),
-                wanted: format!("fewer on adapter {:?}; take a larger sample_distance, or cpu", self.gpu.name()),
-            });
+            return Err(cut_short(NAME, self.gpu.name(), step));
         }
         frame.warnings = drawn.iter().flat_map(|s| s.warnings.clone()).collect();
         if counts.rays == 0 && !drawn.is_empty() {

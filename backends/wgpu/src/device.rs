@@ -4,6 +4,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use thiserror::Error;
 use volact_core::{ActionError, select::SOFTWARE};
+use volact_shaders::gpu::scene::cuts_loops;
 
 use crate::{check::NAME, options::Adapter};
 
@@ -156,10 +157,9 @@ impl Gpu {
         &self.name
     }
 
-    /// Whether it ends loops after 65,535 rounds of all loops of an invocation together, as llvmpipe
-    /// does (`LP_MAX_TGSI_LOOP_ITERATIONS`).
+    /// See [`cuts_loops`].
     pub fn cuts_loops(&self) -> bool {
-        self.name.starts_with("llvmpipe")
+        cuts_loops(&self.name)
     }
 
     /// Whether it has a feature.

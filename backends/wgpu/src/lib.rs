@@ -30,7 +30,6 @@ pub mod onto;
 mod options;
 pub mod pipeline;
 mod plan;
-mod programs;
 pub mod readback;
 pub mod resources;
 mod skip;

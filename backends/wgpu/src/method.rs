@@ -1,7 +1,6 @@
 //! What a frame says about how it was made.
 
 use volact_core::{Compositing, Method, ParameterValue, Warning, WarningCode, resolve::ResolvedShape};
-use volact_shaders::gpu::voxels::Texel;
 
 use crate::{
     device::Gpu,
@@ -12,7 +11,7 @@ use crate::{
 /// How the shapes drawn were made into a picture.
 pub fn method(drawn: &[&ResolvedShape], volumes: &Volumes, step: f64, settings: &Settings, gpu: &Gpu) -> Method {
     let held: Vec<&Held> = all(drawn, volumes).map(|(_, held)| held).collect();
-    let mut formats: Vec<_> = held.iter().map(|h| format_name(h)).collect();
+    let mut formats: Vec<_> = held.iter().map(|h| h.encoding.name()).collect();
     formats.sort();
     formats.dedup();
     let first = |s: &&ResolvedShape| s.compositing() == Compositing::First;
@@ -57,15 +56,4 @@ fn all<'a>(
             _ => None,
         })
     })
-}
-
-fn format_name(held: &Held) -> String {
-    let channels = ["", "r", "rg", "rgb", "rgba"][held.encoding.channels];
-    let texel = match held.encoding.texel {
-        Texel::Unorm8 => "8",
-        Texel::Unorm16 => "16",
-        Texel::Float16 => "16f",
-        Texel::Float32 => "32f",
-    };
-    format!("{channels}{texel}")
 }

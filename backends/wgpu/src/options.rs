@@ -1,7 +1,7 @@
 //! The options of the action `wgpu`.
 
 use volact_core::{Declaration, Options, ParameterDecl, ParameterType, ParameterValue, parameter::Kind};
-use volact_shaders::gpu::voxels::{Texel, Wanted};
+use volact_shaders::gpu::voxels::Wanted;
 
 /// A thousandth of an 8-bit step.
 pub const TERMINATION: f64 = 1.0 / 255_000.0;
@@ -60,7 +60,7 @@ pub fn declaration() -> Declaration {
         )
         .with(choice(
             "format",
-            &["auto", "r8", "r16", "r16f", "r32f"],
+            &Wanted::WORDS,
             "how voxels lie in textures; auto takes the smallest that holds them to the bit, or r32f",
         ))
         .with(choice(
@@ -91,13 +91,7 @@ impl Settings {
         Self {
             sample_distance: number("sample_distance"),
             termination: number("termination").unwrap_or(TERMINATION),
-            format: match word("format") {
-                "r8" => Wanted::Texel(Texel::Unorm8),
-                "r16" => Wanted::Texel(Texel::Unorm16),
-                "r16f" => Wanted::Texel(Texel::Float16),
-                "r32f" => Wanted::Texel(Texel::Float32),
-                _ => Wanted::Exact,
-            },
+            format: Wanted::named(word("format")),
             hardware: word("filter") == "hardware",
             skipping: options.get("skipping") != Some(&ParameterValue::Bool(false)),
             adapter: Adapter { name: word("adapter").into(), low_power: word("power") == "low" },

@@ -3,23 +3,12 @@
 use std::{collections::HashMap, sync::Arc};
 
 use volact_core::ActionError;
-use volact_shaders::gpu::{ComposeError, Layout, Recipe, VolumeUse, compose};
+use volact_shaders::gpu::{ComposeError, Layout, Recipe, VolumeUse, compose, scene::Key};
 
 use crate::{check::NAME, device::Gpu};
 
 /// Pipelines that are kept.
 const MOST: usize = 64;
-
-/// What a pipeline depends on.
-#[derive(Clone, Debug, PartialEq, Eq, Hash)]
-pub struct Key {
-    /// For each shape its shader, by address, and how its volumes are read.
-    pub shapes: Vec<(usize, Vec<Option<VolumeUse>>)>,
-    /// The stretches that clips may leave.
-    pub spans: u32,
-    /// Whether a shape has slice planes.
-    pub planes: bool,
-}
 
 /// A pipeline with its bindings.
 #[derive(Debug)]

@@ -60,7 +60,8 @@ impl Volumes {
                 continue;
             }
             let encoding = Encoding::new(volume, settings.format, gpu.has(wgpu::Features::TEXTURE_FORMAT_16BIT_NORM));
-            check(gpu, shape, volume, &encoding)?;
+            let device = (gpu.name(), gpu.limits.max_texture_dimension_3d);
+            encoding.check((NAME, &shape.name), volume, device)?;
             let mut held = match self.held.remove(&volume.id()).filter(|h| fits(h, &encoding)) {
                 Some(held) => held,
                 None => {
@@ -86,6 +87,11 @@ impl Volumes {
             }
         }
         self.held.retain(|id, _| ids.contains(id));
+    }
+
+    /// How a volume that was prepared is encoded, and whether the device's sampler may interpolate it.
+    pub fn held(&self, volume: &Volume) -> Option<(Encoding, bool)> {
+        self.get(volume).map(|held| (held.encoding, held.filterable))
     }
 
     /// A volume that was prepared.
@@ -119,34 +125,6 @@ fn format(encoding: &Encoding) -> wgpu::TextureFormat {
         (Texel::Float32, 2) => F::Rg32Float,
         (Texel::Float32, _) => F::Rgba32Float,
     }
-}
-
-fn check(gpu: &Gpu, shape: &ResolvedShape, volume: &Volume, encoding: &Encoding) -> Result<(), ActionError> {
-    let most = gpu.limits.max_texture_dimension_3d as usize;
-    let dims = volume.dims();
-    if dims.iter().any(|n| *n > most) {
-        return Err(ActionError::Limit {
-            action: NAME.into(),
-            what: format!("size of volume {:?}", volume.name()),
-            found: format!("{} × {} × {}", dims[0], dims[1], dims[2]),
-            wanted: format!("at most {most} samples along an axis on adapter {:?}; reduce it, or take cpu", gpu.name()),
-        });
-    }
-    let floats = volume.desc().scalar.is_float();
-    if floats && !encoding.holds_nan() && has_nan(volume) {
-        return Err(ActionError::Unsupported {
-            action: NAME.into(),
-            shape: shape.name.clone(),
-            what: format!("samples of volume {:?} that are no numbers in a format of whole numbers", volume.name()),
-            cure: "set the option format to auto or r32f".into(),
-        });
-    }
-    Ok(())
-}
-
-fn has_nan(volume: &Volume) -> bool {
-    let (scalar, bytes) = (volume.desc().scalar, volume.data().bytes());
-    (0..bytes.len() / scalar.size()).any(|i| !scalar.read(bytes, i).is_finite())
 }
 
 fn size(volume: &Volume) -> wgpu::Extent3d {

@@ -72,12 +72,12 @@ pub fn compose(recipes: &[Recipe], spans: u32, planes: bool, watched: bool) -> R
 }
 
 /// Composes the stages that draw slabs of shapes, all of which are composited in depth: a vertex stage
-/// `volact_corner` and a fragment stage `volact_run`. `spans` as for [`compose`].
+/// `volact_corner` and a fragment stage `volact_run`. `spans` and `watched` as for [`compose`].
 ///
 /// # Errors
 /// As [`compose`].
-pub fn compose_slices(recipes: &[Recipe], spans: u32) -> Result<Composition, ComposeError> {
-    stage(recipes, spans, (false, false), &SLICES)
+pub fn compose_slices(recipes: &[Recipe], spans: u32, watched: bool) -> Result<Composition, ComposeError> {
+    stage(recipes, spans, (false, watched), &SLICES)
 }
 
 fn stage(

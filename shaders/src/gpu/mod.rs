@@ -7,7 +7,7 @@
 //!    functions in place of the stubs of parameters, and a budget for loops.
 //! 4. [`pack`] writes a shape's numbers into their rows, [`table`] a lookup table, [`voxels`] says how
 //!    voxels lie in a texture, [`skip`] where nothing can be seen,
-//!    [`onto`] how a picture is laid over an application's.
+//!    [`onto`] how a picture is laid over an application's; [`scene`] does so for all shapes of a frame.
 //!
 //! # Bindings
 //! Group 0: 0 the frame ([`FrameNumbers`], uniform), 1 rows of numbers (uniform), 2 rows of tables, 3 what the
@@ -23,6 +23,7 @@ mod layout;
 mod merge;
 pub mod onto;
 pub mod pack;
+pub mod scene;
 pub mod skip;
 pub mod table;
 pub mod voxels;

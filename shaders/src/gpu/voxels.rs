@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use volact_core::{ScalarType, Volume, volume::VolumeDesc};
+use volact_core::{ActionError, ScalarType, Volume, volume::VolumeDesc};
 
 /// The type of a texture's numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -36,6 +36,22 @@ pub enum Wanted {
     Exact,
     /// This one, whatever it loses.
     Texel(Texel),
+}
+
+impl Wanted {
+    /// Words that name what can be asked for: the choices of an action's option.
+    pub const WORDS: [&str; 5] = ["auto", "r8", "r16", "r16f", "r32f"];
+
+    /// What a word asks for.
+    pub fn named(word: &str) -> Self {
+        match word {
+            "r8" => Self::Texel(Texel::Unorm8),
+            "r16" => Self::Texel(Texel::Unorm16),
+            "r16f" => Self::Texel(Texel::Float16),
+            "r32f" => Self::Texel(Texel::Float32),
+            _ => Self::Exact,
+        }
+    }
 }
 
 /// What a texture's numbers are in data units: number × scale + offset.
@@ -111,6 +127,51 @@ impl Encoding {
     /// Whether the texture's numbers are the stored ones to the bit.
     pub fn is_exact(&self) -> bool {
         !matches!(self.code, Code::Spread { .. })
+    }
+
+    /// A name of the format, e.g. `rg16f`.
+    pub fn name(&self) -> String {
+        let channels = ["", "r", "rg", "rgb", "rgba"][self.channels];
+        let texel = match self.texel {
+            Texel::Unorm8 => "8",
+            Texel::Unorm16 => "16",
+            Texel::Float16 => "16f",
+            Texel::Float32 => "32f",
+        };
+        format!("{channels}{texel}")
+    }
+
+    /// Refuses a volume of a shape that has no place in the format, or more samples along an axis than
+    /// `most`, which an adapter has room for.
+    ///
+    /// # Errors
+    /// [`ActionError::Limit`] or [`ActionError::Unsupported`] of an action.
+    pub fn check(
+        &self,
+        (action, shape): (&str, &str),
+        volume: &Volume,
+        (adapter, most): (&str, u32),
+    ) -> Result<(), ActionError> {
+        let dims = volume.dims();
+        if dims.iter().any(|n| *n > most as usize) {
+            return Err(ActionError::Limit {
+                action: action.into(),
+                what: format!("size of volume {:?}", volume.name()),
+                found: format!("{} × {} × {}", dims[0], dims[1], dims[2]),
+                wanted: format!("at most {most} samples along an axis on adapter {adapter:?}; reduce it, or take cpu"),
+            });
+        }
+        let (scalar, bytes) = (volume.desc().scalar, volume.data().bytes());
+        let all_numbers = || (0..bytes.len() / scalar.size()).all(|i| scalar.read(bytes, i).is_finite());
+        if scalar.is_float() && !self.holds_nan() && !all_numbers() {
+            return Err(ActionError::Unsupported {
+                action: action.into(),
+                shape: shape.into(),
+                what: format!("samples of volume {:?} that are no numbers in a format of whole numbers", volume.name()),
+                cure: "set the option format to auto or r32f".into(),
+            });
+        }
+        Ok(())
     }
 
     /// Whether a sample that is not a number could be told: whole numbers cannot.
