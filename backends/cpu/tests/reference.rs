@@ -28,6 +28,8 @@ mod mesh_common;
 mod mesh_volume;
 #[path = "reference/opaque.rs"]
 mod opaque;
+#[path = "reference/realistic.rs"]
+mod realistic;
 #[path = "reference/slices.rs"]
 mod slices;
 #[path = "reference/source_common.rs"]
@@ -42,7 +44,5 @@ mod source_over;
 mod source_refused;
 #[path = "reference/source_scene.rs"]
 mod source_scene;
-#[path = "reference/speed.rs"]
-mod speed;
 #[path = "reference/surfaces.rs"]
 mod surfaces;

@@ -164,6 +164,7 @@ impl RenderAction for CpuAction {
             let message = "no ray meets any shape; check camera, near and far, and transforms";
             frame.warnings.push(Warning::new(WarningCode::NothingVisible, NAME, message));
         }
+        frame.warnings.extend(method::coarse(&drawn, plan.step, &self.resources));
         frame.warnings.extend(method::adjusted(&drawn, &self.resources, &self.settings));
         for warning in frame.warnings.iter().filter(|w| w.severity == Severity::Warning) {
             if self.said.insert(warning.to_string()) {

@@ -9,6 +9,8 @@ use volact_core::{mutated, table::ResolvedTable};
 
 /// Interpolation error that a table is refined to.
 const WANTED_ERROR: f64 = 1e-6;
+/// Unit distances in a segment from which a table may be saturated, and what is then left of light.
+const SATURATED: (f64, f64) = (4.0, 1e-5);
 /// Most intervals that are tried.
 const MOST: usize = 1 << 16;
 /// Most intervals for accuracy where nodes miss control points anyway.
@@ -64,6 +66,9 @@ pub struct SegmentTable {
     pub error: f64,
     /// First and last number on the grid.
     pub domain: [f64; 2],
+    /// Whether segments of several unit distances hide here how dense they are: next to opaque, they
+    /// cannot be cut to a part.
+    pub saturated: bool,
     /// How many nodes up to each have any opacity at or just after them.
     seen: Vec<u32>,
 }
@@ -85,10 +90,14 @@ impl SegmentTable {
             intervals *= 2;
             (nodes, error) = tabulate(&segment, domain, intervals);
         }
-        Self::from_nodes(nodes, error, domain, |lo, hi| {
+        let number = |i: usize| domain[0] + (domain[1] - domain[0]) * i as f64 / (nodes.len().max(2) - 1) as f64;
+        let hides = |i: usize| table.classify(units.data(number(i)))[3] < 1.0 && 1.0 - nodes[i][3] < SATURATED.1;
+        let saturated = h >= SATURATED.0 && (0..nodes.len()).any(hides);
+        let made = Self::from_nodes(nodes, error, domain, |lo, hi| {
             let (a, b) = (units.data(lo), units.data(hi));
             table.max_opacity(a.min(b), a.max(b)) > 0.0
-        })
+        });
+        Self { saturated, ..made }
     }
 
     fn from_nodes(nodes: Vec<[f64; 4]>, error: f64, domain: [f64; 2], opaque: impl Fn(f64, f64) -> bool) -> Self {
@@ -108,7 +117,7 @@ impl SegmentTable {
         // Coordinates are compared before they are clamped: what the first node makes visible is so
         // below it, too.
         let dark = if first == 0 { f32::NEG_INFINITY } else { first as f32 - 1.0 };
-        Self { entries, nodes: count, scale: scale as f32, offset, dark, error, domain, seen }
+        Self { entries, nodes: count, scale: scale as f32, offset, dark, error, domain, saturated: false, seen }
     }
 
     /// Bytes held.
@@ -281,6 +290,17 @@ mod tests {
         let s = SegmentTable::new(&t, PLAIN, None, 2.0);
         assert!((s.lookup(50.0)[3] - 0.75).abs() < 2e-6);
         assert_eq!(s.lookup(100.0)[3], 1.0);
+    }
+
+    #[test]
+    fn segments_that_hide_how_dense_they_are_are_known() {
+        let saturated =
+            |opacity: f64, h: f64| SegmentTable::new(&table(&[(0.0, 0.0), (100.0, opacity)]), PLAIN, None, h).saturated;
+        assert!(saturated(0.7, 40.0) && saturated(1.0, 5.0) && saturated(0.95, 4.0));
+        assert!(!saturated(0.7, 4.0) && !saturated(1.0, 2.0) && !saturated(0.01, 40.0));
+        // A step to opaque is opaque over any length.
+        let step = table(&[(0.0, 0.0), (50.0, 0.1), (50.0, 1.0), (100.0, 1.0)]);
+        assert!(!SegmentTable::new(&step, PLAIN, None, 40.0).saturated);
     }
 
     #[test]

@@ -10,9 +10,10 @@ use super::{
     preintegrate::SegmentPairs,
     reduce::{self, Reduced},
     shaded::{
-        self, Skip, batch,
+        self, Skip,
         field::{self, Field, Places},
         lookup::{self, Lookup},
+        rows,
     },
     simd::{LANES, Plain, Simd, Unit},
     slopes::Slopes,
@@ -246,13 +247,13 @@ unsafe fn values_by<S: Simd>(of: &Field<'_>, p: Places<'_>, out: &mut [f32]) {
 /// # Safety
 /// None of its own: it is unsafe so that it is called like the kernels.
 #[inline(always)]
-unsafe fn places_by(lines: &[[&Lanes; 2]; 3], rows: &[batch::Row], shift: f64, out: [&mut [f32]; 3]) {
-    batch::places(lines, rows, shift, out);
+unsafe fn places_by(lines: &[[&Lanes; 2]; 3], rows: &[rows::Row], shift: f64, out: [&mut [f32]; 3]) {
+    rows::places(lines, rows, shift, out);
 }
 
 by_unit! {
     /// The positions of rows of samples along lines, by axis.
-    places(lines: &[[&Lanes; 2]; 3], rows: &[batch::Row], shift: f64, out: [&mut [f32]; 3]),
+    places(lines: &[[&Lanes; 2]; 3], rows: &[rows::Row], shift: f64, out: [&mut [f32]; 3]),
     => places_by(lines, rows, shift, out)
 }
 

@@ -6,7 +6,7 @@ use super::{
     check::caps,
     options::{Classification, Settings},
     plan::Plan,
-    resources::Resources,
+    resources::{Resources, Tables},
     shaded,
 };
 
@@ -60,6 +60,21 @@ fn evaluated(compositing: Compositing, shader: Option<&shaded::Shader>) -> &'sta
         Compositing::Over if shader.is_some_and(shaded::Shader::pre_integrates) => "shader evaluated over segments",
         _ => "shader evaluated in the middle of segments",
     }
+}
+
+/// Shapes whose segments are too long for what they absorb.
+pub fn coarse(drawn: &[&ResolvedShape], step: f64, resources: &Resources) -> Vec<Warning> {
+    let saturated = |s: &&&ResolvedShape| resources.tables(s.id).is_some_and(Tables::saturated);
+    let warn = |s: &&ResolvedShape| {
+        let unit = s.float("unit_distance").unwrap_or(1.0);
+        let message = format!(
+            "sample_distance {step:?} is {:.1} unit distances: segments are all but opaque, and where the shape \
+             ends inside one it is drawn as if it filled it; take a shorter one",
+            step / unit
+        );
+        Warning::new(WarningCode::CoarseSampling, &s.name, message)
+    };
+    drawn.iter().filter(saturated).map(warn).collect()
 }
 
 /// Settings asked for that a shape's way of drawing has no use for.

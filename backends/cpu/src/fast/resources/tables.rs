@@ -137,6 +137,11 @@ impl Tables {
         matches!(self.made, Made::Table { pairs: Some(_), .. })
     }
 
+    /// Whether parts of segments cannot be told from whole ones: see [`SegmentTable::saturated`].
+    pub fn saturated(&self) -> bool {
+        matches!(&self.made, Made::Table { table, .. } if table.saturated)
+    }
+
     /// Entries along an axis; 0 where nothing is tabulated.
     pub fn width(&self) -> usize {
         match &self.made {

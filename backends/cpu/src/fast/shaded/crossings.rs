@@ -10,8 +10,9 @@ use volact_shaders::Entry;
 
 use super::{
     Shader,
-    batch::{Evaluator, ROWS, Rays, Row, Worker},
+    batch::{Evaluator, ROWS, Rays, Worker},
     flat::premultiplied,
+    rows::Row,
 };
 use crate::fast::{
     packet::{Lanes, Packet},

@@ -5,8 +5,9 @@ use volact_shaders::Entry;
 
 use super::{
     Shader,
-    batch::{Evaluator, ROWS, Rays, Row, Rows, Worker},
+    batch::{Evaluator, ROWS, Rays, Worker},
     field::sixteen,
+    rows::{Row, Rows},
     skip::{self, Skip},
 };
 use crate::fast::{

@@ -6,7 +6,8 @@ use volact_shaders::Entry;
 
 use super::{
     Shader,
-    batch::{Evaluator, ROWS, Rays, Row, Worker},
+    batch::{Evaluator, ROWS, Rays, Worker},
+    rows::Row,
 };
 use crate::fast::{
     packet::{Lanes, Packet},

@@ -16,6 +16,7 @@ pub mod field;
 mod flat;
 mod lit;
 pub mod lookup;
+pub mod rows;
 mod skip;
 mod surroundings;
 pub mod trail;
