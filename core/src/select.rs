@@ -47,6 +47,14 @@ fn reasons(refused: &[(String, String)]) -> String {
 /// The reason for a preferred action that nobody registered.
 pub const NOT_REGISTERED: &str = "not registered";
 
+/// How the reason begins for a preferred action that has no device to run on.
+pub const NO_DEVICE: &str = "no device";
+
+/// Whether a reason says that an action is not to be had on this machine, whatever the scene.
+pub fn is_absent(why: &str) -> bool {
+    why == NOT_REGISTERED || why.starts_with(NO_DEVICE)
+}
+
 /// How the device of an action begins that stands for a GPU which is none: only where no other
 /// preferred action can draw is such a one taken.
 pub const SOFTWARE: &str = "software: ";
@@ -72,8 +80,8 @@ pub fn select(
     for name in &config.prefer {
         match attempt(registry, name, &config.options_of(name, options), shapes) {
             Ok(action) if action.caps().device.starts_with(SOFTWARE) => {
-                let why = format!("runs on a device that is no GPU ({}); name it to take it", action.caps().device);
-                log::info!("action {name} is taken last: it {why}");
+                let why = format!("{NO_DEVICE} that is a GPU ({}); name it to take it", action.caps().device);
+                log::info!("action {name} is taken last: {why}");
                 refused.push((name.clone(), why));
                 last.get_or_insert((name.clone(), action));
             }
@@ -100,7 +108,10 @@ fn attempt(
     if !registry.action_names().any(|known| known == name) {
         return Err(NOT_REGISTERED.into());
     }
-    let mut action = registry.action(name, options).map_err(|e| chain(&e))?;
+    let mut action = registry.action(name, options).map_err(|e| match &e {
+        ActionError::Backend { .. } => format!("{NO_DEVICE}: {}", chain(&e)),
+        _ => chain(&e),
+    })?;
     let resolved: Result<Vec<_>, _> = shapes.iter().map(|s| ResolvedShape::new(s, registry.shaders())).collect();
     let resolved = resolved.map_err(|e| chain(&e))?;
     can_draw(&action.caps(), &resolved)?;
@@ -235,7 +246,7 @@ mod tests {
         let choice = select(&registry, &config, None, &Options::new(), &[]).unwrap();
         assert_eq!(
             (choice.name.as_str(), choice.refused[0].1.as_str()),
-            ("null", "runs on a device that is no GPU (software: pipe); name it to take it")
+            ("null", "no device that is a GPU (software: pipe); name it to take it")
         );
         let choice = select(&registry, &config, Some("softer"), &Options::new(), &shapes(1)).unwrap();
         assert_eq!(choice.name, "softer");

@@ -387,5 +387,7 @@ fn actions_that_are_not_there_are_news_only_to_those_who_ask() {
     let folder = folder();
     let draw = |more: &[&str]| out(&volact(folder.path(), &[&["render", "ball.nrrd", "--size", "8"], more].concat()));
     assert!(!draw(&[]).contains("not by"));
-    assert!(draw(&["-v"]).contains("not by  wgpu: not registered"));
+    let told = draw(&["-v"]);
+    // Where there is a GPU it draws.
+    assert!(told.contains("not by  wgpu: no device") || told.contains("how     wgpu:"), "{told}");
 }

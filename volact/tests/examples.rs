@@ -156,8 +156,8 @@ fn examples_are_small_and_complete() {
     for folder in fs::read_dir(examples()).unwrap().map(|e| e.unwrap().path()).filter(|p| p.is_dir()) {
         for file in fs::read_dir(folder).unwrap().map(|e| e.unwrap()) {
             bytes += file.metadata().unwrap().len();
-            let shader = file.path().with_extension("wgsl").exists();
-            scenes += usize::from(file.path().extension().is_some_and(|e| e == "ron") && !shader);
+            let is_scene = |path: &Path| fs::read_to_string(path).unwrap().lines().any(|l| l.starts_with("Scene("));
+            scenes += usize::from(file.path().extension().is_some_and(|e| e == "ron") && is_scene(&file.path()));
         }
     }
     assert!(bytes < MOST_BYTES, "{bytes}");

@@ -62,8 +62,8 @@ impl Report<'_> {
             _ = writeln!(text, "  look    {note}");
         }
         _ = writeln!(text, "  how     {}: {}", self.source.choice.name, self.method());
-        // That a backend is not there at all is no news, unless the user wants all of them.
-        let told = |why: &str| why != select::NOT_REGISTERED || log::log_enabled!(log::Level::Info);
+        // That a backend, or its device, is not there at all is no news, unless the user wants all of them.
+        let told = |why: &str| !select::is_absent(why) || log::log_enabled!(log::Level::Info);
         for (name, why) in self.source.choice.refused.iter().filter(|(_, why)| told(why)) {
             _ = writeln!(text, "  not by  {name}: {why}");
         }
