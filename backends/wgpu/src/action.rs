@@ -143,7 +143,7 @@ impl WgpuAction {
         self.emit(&frame);
         frame.method = method::method(&drawn, &self.drawing.volumes, step, &self.settings, &self.gpu);
         let stats = &mut frame.statistics;
-        (stats.rays, stats.samples) = (counts.rays, counts.samples);
+        (stats.rays, stats.samples, stats.skipped) = (counts.rays, counts.samples, counts.skipped);
         (stats.prepare, stats.total) = (prepare, at.elapsed());
         stats.render = stats.total - prepare;
         stats.resident_bytes = resident;

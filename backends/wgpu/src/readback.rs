@@ -39,7 +39,9 @@ pub struct Counts {
     pub cut: bool,
     /// Samples.
     pub samples: u64,
-    /// Rays that took one.
+    /// Samples known to be empty without having been taken.
+    pub skipped: u64,
+    /// Rays that took one, or skipped some.
     pub rays: u64,
     /// Seconds on the device, where it counts them.
     pub seconds: Option<f64>,
@@ -177,6 +179,7 @@ impl Target {
             cut: word(CUT_FLAG) != 0,
             samples: sum(1),
             rays: sum(1 + COUNTERS),
+            skipped: sum(CUT_FLAG + 1),
             seconds: self.timer.as_ref().map(seconds),
         }
     }

@@ -12,7 +12,8 @@
 //! # Bindings
 //! Group 0: 0 the frame ([`FrameNumbers`], uniform), 1 rows of numbers (uniform), 2 rows of tables, 3 what the
 //! application has drawn, 4 pixels, 5 depths, 6 flags: the shape whose loop overran its budget, plus 1;
-//! then 64 counts of samples and 64 of rays, and whether the device has cut a loop short; 7 what can be skipped. Group 1: 0 a sampler, then the
+//! then 64 counts of samples and 64 of rays, whether the device has cut a loop short, and 64 counts of what was
+//! skipped; 7 what can be skipped. Group 1: 0 a sampler, then the
 //! volumes' textures.
 //!
 //! All numbers are f32 in [local space](crate::signatures), the origin near the shape.
@@ -37,11 +38,11 @@ use thiserror::Error;
 /// Rows of numbers for each shape, before those of parameters.
 pub const SHAPE_ROWS: u32 = 8;
 
-/// Counters of samples, and as many of rays.
+/// Counters of samples, and as many of rays and of what was skipped.
 pub const COUNTERS: usize = 64;
 
 /// Words of the flags' buffer.
-pub const FLAGS: usize = 2 + 2 * COUNTERS;
+pub const FLAGS: usize = 2 + 3 * COUNTERS;
 
 /// The flag that is not 0 where the device has cut a loop short.
 pub const CUT_FLAG: usize = 1 + 2 * COUNTERS;

@@ -46,7 +46,7 @@ struct VolactFrame {
 @group(0) @binding(0) var<uniform> volact_frame: VolactFrame;
 @group(0) @binding(1) var<uniform> volact_numbers: array<vec4<u32>, 4096>;
 @group(0) @binding(2) var<storage, read> volact_tables: array<vec4<u32>>;
-@group(0) @binding(6) var<storage, read_write> volact_flags: array<atomic<u32>, 130>;
+@group(0) @binding(6) var<storage, read_write> volact_flags: array<atomic<u32>, 194>;
 
 // Rounds that loops of shaders may still go for this sample, and the shape that is evaluated.
 var<private> volact_rounds: u32;

@@ -5,12 +5,15 @@ var<private> volact_color: vec4<f32>;
 var<private> volact_left: f32;
 var<private> volact_depth: f32;
 var<private> volact_samples: u32;
+// Segments of the lattice that were known to be empty.
+var<private> volact_skipped: u32;
 
 fn volact_dark() {
     volact_color = vec4<f32>(0.0);
     volact_left = 1.0;
     volact_depth = volact_frame.infinity;
     volact_samples = 0u;
+    volact_skipped = 0u;
 }
 
 // Emission and absorption of a medium from t0 to t1: the exact exponential.

@@ -21,6 +21,7 @@ fn volact_over(shape: u32, ray: VolactRay) {
                 if look { ahead = volact_ahead(shape, ray, middle); }
                 if ahead > middle {
                     k = volact_beyond(k, ahead, b);
+                    volact_skipped += u32(k - from_k);
                     border = volact_border(k);
                 } else {
                     let m = volact_shade(shape, volact_sample(shape, ray, middle, t1 - t0, 0.0));

@@ -29,9 +29,10 @@ fn volact_picture(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     volact_pixels[at] = volact_color;
     volact_depths[at] = volact_depth;
-    if volact_samples > 0u {
+    if volact_samples + volact_skipped > 0u {
         let counter = 1u + ((id.x >> 3u) + 7u * (id.y >> 3u)) % 64u;
         atomicAdd(&volact_flags[counter], volact_samples);
         atomicAdd(&volact_flags[counter + 64u], 1u);
+        atomicAdd(&volact_flags[counter + 129u], volact_skipped);
     }
 }

@@ -58,6 +58,7 @@ fn volact_forward(shape: u32, ray: VolactRay) {
             let ahead = volact_ahead(shape, ray, middle);
             if ahead > middle {
                 let next = volact_beyond(k + 1, ahead, ends.y);
+                volact_skipped += u32(next - k);
                 volact_tracks[shape].k = next;
                 volact_tracks[shape].start = t0;
                 volact_tracks[shape].end = min(volact_border(next), ends.y);

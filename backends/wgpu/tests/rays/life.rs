@@ -106,6 +106,10 @@ fn skipping_changes_no_bit_and_saves_samples() {
         assert!(identical(&with, &without));
         let samples = [&with, &without].map(|f| f.statistics.samples);
         assert!(samples[0] < samples[1] * 4 / 5, "{samples:?}");
+        // What was not taken is counted, and rays that took nothing are rays all the same.
+        let counts = [&with, &without].map(|f| (f.statistics.samples + f.statistics.skipped, f.statistics.rays));
+        assert_eq!(counts[0], counts[1]);
+        assert_eq!(without.statistics.skipped, 0);
         let ended = rays(STEP).with("termination", 0.05);
         let [with, without] = [true, false].map(|on| draw(&ended.clone().with("skipping", on), &shapes, &desc));
         assert!(identical(&with, &without));
