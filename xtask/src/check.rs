@@ -4,12 +4,15 @@ use std::{env, path::Path, process::Command};
 
 use anyhow::{Context, Result, bail};
 
-/// The whole test suite. It needs nothing but the compiler; tests of real data look for them in
-/// the folder that `VOLACT_DATA` names and say so where it is missing.
+use crate::packages;
+
+/// The whole test suite, after what it needs of the system was installed; tests of real data look for
+/// them in the folder that `VOLACT_DATA` names and say so where it is missing.
 pub fn test() -> Result<()> {
     if env::var_os("VOLACT_DATA").is_none() {
         println!("VOLACT_DATA is not set: tests of real data files are skipped");
     }
+    packages::ensure();
     cargo(&["test", "--workspace", "--no-fail-fast"], &[])
 }
 

@@ -6,6 +6,7 @@ mod evaluator;
 mod header;
 mod mesh_peers;
 mod new_plugin;
+mod packages;
 mod peer;
 mod peer_scene;
 mod peers;
