@@ -60,7 +60,7 @@ fn refused(shape: &ResolvedShape, program: &Program) -> Option<(String, &'static
             _ => {}
         }
     }
-    unfit(shape, program)
+    unfit(shape)
 }
 
 /// The error of a limit that is passed.

@@ -59,5 +59,5 @@ fn refused(shape: &ResolvedShape, program: &Program) -> Option<(String, &'static
             _ => {}
         }
     }
-    unfit(shape, program)
+    unfit(shape)
 }

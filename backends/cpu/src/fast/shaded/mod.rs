@@ -24,7 +24,7 @@ pub mod trail;
 use std::{collections::BTreeMap, sync::Arc};
 
 use volact_core::{
-    ActionError, Compositing, LookupTable, ParameterType, ParameterValue, ShaderEntry, SliceStyle, TableInterpolation,
+    ActionError, Compositing, LookupTable, ParameterType, ParameterValue, ShaderEntry, TableInterpolation,
     VolumeTexture,
     glam::{DAffine3, DVec3},
     parameter::ParameterMap,
@@ -34,6 +34,7 @@ use volact_shaders::{
     Entry, Kernel, Program,
     eval::{Field, Function, Input, Uniforms},
     signatures::Derived,
+    unfit,
 };
 
 use super::options::{Classification, Settings};
@@ -64,18 +65,8 @@ pub fn by_cells(shape: &ResolvedShape) -> bool {
 /// What of a shape with such a shader is not drawn, and what its user can do.
 pub fn refused(shape: &ResolvedShape) -> Option<(String, String)> {
     let name = &shape.shader.declaration.name;
-    let geometry = &shape.state.geometry;
-    if geometry.as_surface().is_some() {
+    if shape.state.geometry.as_surface().is_some() {
         return Some((format!("a surface with shader {name:?}"), "draw it with the shader \"surface\"".into()));
-    }
-    if geometry.slices().is_some() && shape.compositing() != Compositing::Over {
-        let what = format!("slice planes with shader {name:?} of compositing {}", shape.compositing().name());
-        return Some((what, "draw them with a shader of compositing over".into()));
-    }
-    let blended = geometry.slices().is_some_and(|s| s.style == SliceStyle::Blended);
-    if blended && shape.float("unit_distance").is_none() {
-        let what = format!("blended slice planes with shader {name:?}, which has no unit_distance");
-        return Some((what, "declare that parameter, or draw opaque planes".into()));
     }
     let before =
         |v: &ParameterValue| matches!(v, ParameterValue::Table(t) if t.interpolation() == TableInterpolation::Pre);
@@ -85,16 +76,7 @@ pub fn refused(shape: &ResolvedShape) -> Option<(String, String)> {
             "let it apply after interpolation".into(),
         ));
     }
-    let wanted = component(shape);
-    shape.parameters.iter().find_map(|(name, value)| {
-        let count = match value {
-            ParameterValue::Volume(texture) => texture.volume().desc().components,
-            ParameterValue::Attribute(attribute) => attribute.components,
-            _ => return None,
-        };
-        let what = format!("component {wanted} of parameter {name:?} with {count}");
-        (wanted >= count).then(|| (what, format!("name one of 0 to {}", count - 1)))
-    })
+    unfit(shape)
 }
 
 /// The table of a parameter and the range that it is taken over: a grey one where it was left out.

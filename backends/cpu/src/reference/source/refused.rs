@@ -38,5 +38,5 @@ fn refused(shape: &ResolvedShape, program: &Program) -> Option<(String, &'static
         let what = format!("a pre-interpolated table in the evaluated shader {name:?}");
         return Some((what, "let it apply after interpolation, or use the shader lut and the option recognise"));
     }
-    unfit(shape, program)
+    unfit(shape)
 }
