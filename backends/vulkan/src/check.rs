@@ -12,13 +12,19 @@ const INSTEAD: &str = "draw it with the action cpu";
 
 /// What it can do.
 pub fn caps(device: &str) -> Caps {
-    let over = |s: &volact_core::ShaderEntry| s.compositing == Compositing::Over && s.declaration.name != "attribute";
     let builtin = volact_shaders::builtin().unwrap_or_default();
     Caps {
-        shaders: Some(builtin.into_iter().filter(over).map(|s| s.declaration.name).collect()),
+        shaders: Some(builtin.into_iter().map(|s| s.declaration.name).filter(|n| n != "attribute").collect()),
         sources: true,
         geometries: Some(vec!["block".into()]),
-        compositing: vec![Compositing::Over],
+        compositing: vec![
+            Compositing::Over,
+            Compositing::Maximum,
+            Compositing::Minimum,
+            Compositing::Average,
+            Compositing::Add,
+            Compositing::First,
+        ],
         overlap: true,
         depth: true,
         device: device.into(),
@@ -39,16 +45,9 @@ pub fn check(shape: &ResolvedShape, program: &Program) -> Result<(), ActionError
 }
 
 fn refused(shape: &ResolvedShape, program: &Program) -> Option<(String, &'static str)> {
-    let (name, compositing) = (&shape.shader.declaration.name, program.compositing());
     let geometry = &shape.state.geometry;
     if geometry.as_block().is_none() {
         return Some((format!("geometry {:?}", geometry.name()), INSTEAD));
-    }
-    if geometry.slices().is_some() {
-        return Some(("slice planes".into(), INSTEAD));
-    }
-    if compositing != Compositing::Over {
-        return Some((format!("shader {name:?} of compositing {}", compositing.name()), INSTEAD));
     }
     for (parameter, value) in &shape.parameters {
         match value {
