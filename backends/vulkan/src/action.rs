@@ -160,7 +160,8 @@ impl RenderAction for VulkanAction {
         let programs = &self.programs;
         let mut found = None;
         self.lifecycle.manage(shape, |shape| {
-            check(shape, &programs.of(shape)?)?;
+            programs.of(shape)?;
+            check(shape)?;
             found = Some(shape.clone());
             Ok(())
         })?;
@@ -180,7 +181,7 @@ impl RenderAction for VulkanAction {
     fn begin_draw(&mut self, frame: &FrameDesc) -> Result<(), ActionError> {
         let started = Instant::now();
         let programs = &self.programs;
-        let open = self.lifecycle.begin(frame, |shape| check(shape, &programs.of(shape)?))?;
+        let open = self.lifecycle.begin(frame, |shape| programs.of(shape).and_then(|_| check(shape)))?;
         let shapes: Vec<ResolvedShape> = open.shapes.values().cloned().collect();
         let kept = self.drawing.volumes.retain(shapes.iter()).map_err(ActionError::from);
         if let Err(error) = kept.and_then(|()| shapes.iter().try_for_each(|s| self.fetch(s))) {

@@ -3,7 +3,7 @@
 use volact_core::{
     ActionError, Caps, Compositing, ParameterValue, TableInterpolation, resolve::ResolvedShape, slicing::SlicingError,
 };
-use volact_shaders::{Program, unfit};
+use volact_shaders::unfit;
 
 /// The action's name.
 pub const NAME: &str = "vulkan";
@@ -12,13 +12,19 @@ const INSTEAD: &str = "draw it with the action cpu";
 
 /// What it can do.
 pub fn caps(device: &str) -> Caps {
-    let over = |s: &volact_core::ShaderEntry| s.compositing == Compositing::Over && s.declaration.name != "attribute";
     let builtin = volact_shaders::builtin().unwrap_or_default();
     Caps {
-        shaders: Some(builtin.into_iter().filter(over).map(|s| s.declaration.name).collect()),
+        shaders: Some(builtin.into_iter().map(|s| s.declaration.name).filter(|n| n != "attribute").collect()),
         sources: true,
         geometries: Some(vec!["block".into()]),
-        compositing: vec![Compositing::Over],
+        compositing: vec![
+            Compositing::Over,
+            Compositing::Maximum,
+            Compositing::Minimum,
+            Compositing::Average,
+            Compositing::Add,
+            Compositing::First,
+        ],
         overlap: true,
         depth: true,
         device: device.into(),
@@ -29,34 +35,27 @@ pub fn caps(device: &str) -> Caps {
 ///
 /// # Errors
 /// [`ActionError::Unsupported`], by name and with a cure.
-pub fn check(shape: &ResolvedShape, program: &Program) -> Result<(), ActionError> {
-    match refused(shape, program) {
+pub fn check(shape: &ResolvedShape) -> Result<(), ActionError> {
+    match refused(shape) {
         None => Ok(()),
         Some((what, cure)) => {
-            Err(ActionError::Unsupported { action: NAME.into(), shape: shape.name.clone(), what, cure: cure.into() })
+            Err(ActionError::Unsupported { action: NAME.into(), shape: shape.name.clone(), what, cure })
         }
     }
 }
 
-fn refused(shape: &ResolvedShape, program: &Program) -> Option<(String, &'static str)> {
-    let (name, compositing) = (&shape.shader.declaration.name, program.compositing());
+fn refused(shape: &ResolvedShape) -> Option<(String, String)> {
     let geometry = &shape.state.geometry;
     if geometry.as_block().is_none() {
-        return Some((format!("geometry {:?}", geometry.name()), INSTEAD));
-    }
-    if geometry.slices().is_some() {
-        return Some(("slice planes".into(), INSTEAD));
-    }
-    if compositing != Compositing::Over {
-        return Some((format!("shader {name:?} of compositing {}", compositing.name()), INSTEAD));
+        return Some((format!("geometry {:?}", geometry.name()), INSTEAD.into()));
     }
     for (parameter, value) in &shape.parameters {
         match value {
             ParameterValue::Table(t) if t.interpolation() == TableInterpolation::Pre => {
                 let cure = "let it apply after interpolation, or draw with the action cpu";
-                return Some((format!("the pre-interpolated table {parameter:?}"), cure));
+                return Some((format!("the pre-interpolated table {parameter:?}"), cure.into()));
             }
-            ParameterValue::Attribute(_) => return Some((format!("the attribute {parameter:?}"), INSTEAD)),
+            ParameterValue::Attribute(_) => return Some((format!("the attribute {parameter:?}"), INSTEAD.into())),
             _ => {}
         }
     }

@@ -4,13 +4,13 @@ use std::sync::Arc;
 
 use ash::vk;
 use volact_core::{
-    ActionError, FrameDesc, Viewport, Volume,
+    ActionError, Compositing, FrameDesc, Viewport, Volume,
     frame::Rebuild,
     glam::DVec3,
     slicing::{Sampling, Slicing, Solid, Step},
 };
 use volact_shaders::gpu::{
-    Layout, MOST_ROWS, Recipe, compose_slices,
+    Layout, MOST_ROWS, Recipe, compose_slices, is_deep,
     pack::Row,
     scene::{self, Item, Key, Limited, Seen},
 };
@@ -23,7 +23,7 @@ use crate::{
     pipeline::{Bound, Cache, Pipeline, Sampler},
     readback::Target,
     resources::{Rows, Volumes},
-    runs::{Corner, corners},
+    runs::{Corner, corners, in_groups},
     stream::{Polygon, Stream},
 };
 
@@ -34,7 +34,7 @@ const MOST: usize = 64;
 #[derive(Debug)]
 pub struct Drawing {
     stream: Stream,
-    pipelines: Vec<(Key, Arc<Pipeline>, Layout)>,
+    pipelines: Vec<((Key, bool), Arc<Pipeline>, Layout)>,
     cache: Cache,
     /// Volumes on the device.
     pub volumes: Volumes,
@@ -104,24 +104,32 @@ impl Drawing {
         settings: &Settings,
         rebuilt: &mut Vec<Rebuild>,
     ) -> Result<Drawn, ActionError> {
-        // An order that does not depend on that of drawing.
-        items.sort_by_key(|i| i.shape.id);
-        let solids = solids(&mut items)?;
-        let slicing = plan(&solids, desc, &settings.sampling)?;
+        // Those composited in depth come first, in an order that does not depend on that of drawing.
+        items.sort_by_key(|i| if is_deep(i.program.compositing()) { (0, i.shape.id) } else { (1, 0) });
+        let mut solids = solids(&mut items)?;
+        let deep = items.iter().filter(|i| is_deep(i.program.compositing())).count();
+        let mut slicing = plan(&solids, desc, &settings.sampling)?;
+        let (order, groups) = in_groups(&slicing, deep);
+        if !order.is_sorted() {
+            items = in_order(items, &order);
+            solids = in_order(solids, &order);
+            slicing = plan(&solids, desc, &settings.sampling)?;
+        }
         let step = *slicing.step();
         // Without shapes there is no step, and nothing that needs one.
         let distance = if step.distance > 0.0 { step.distance } else { 1.0 };
         let seen = Seen::new(desc, &items, distance)?;
         let held = |volume: &Volume| self.volumes.held(volume);
         let recipes: Vec<Recipe> = items.iter().map(|i| i.recipe(settings.hardware, held)).collect();
-        let (pipeline, layout) = self.pipeline(gpu, &items, &recipes, desc, rebuilt)?;
+        let sweeps = groups.iter().any(|g| g[1] - g[0] > 1);
+        let (pipeline, layout) = self.pipeline(gpu, (&items, &recipes), sweeps, desc, rebuilt)?;
         let held = |volume: &Volume| self.volumes.held(volume);
         let (numbers, tables) = scene::rows((&items, &recipes), (&layout, &seen.anchor), &desc.clip, &[], held);
         let mut uploaded = self.numbers.set(gpu, numbers)? + self.tables.set(gpu, tables)?;
         uploaded += self.set_limits(gpu, seen.limited(desc))?;
         uploaded += self.frame.set(gpu, seen.rows(desc, settings.termination, desc.opaque.is_some()))?;
         let (base, rest) = border(&seen, distance);
-        let (vertices, polygons) = corners(&slicing, base, rest);
+        let (vertices, polygons) = corners(&slicing, &groups, base, rest);
         uploaded += self.set_vertices(gpu, &vertices)?;
         self.make_target(gpu, &seen.viewport)?;
         self.bind(&items, &pipeline)?;
@@ -145,23 +153,27 @@ impl Drawing {
     fn pipeline(
         &mut self,
         gpu: &Arc<Gpu>,
-        items: &[Item<'_>],
-        recipes: &[Recipe],
+        (items, recipes): (&[Item<'_>], &[Recipe]),
+        together: bool,
         desc: &FrameDesc,
         rebuilt: &mut Vec<Rebuild>,
     ) -> Result<(Arc<Pipeline>, Layout), ActionError> {
         let key = Key::new(NAME, items, recipes, &desc.clip)?;
+        let surfaces = items.iter().any(|i| i.program.compositing() == Compositing::First);
+        let sweeps = together || surfaces || key.planes;
+        let key = (key, sweeps);
         if let Some((_, pipeline, layout)) = self.pipelines.iter().find(|(k, ..)| *k == key) {
             return Ok((Arc::clone(pipeline), layout.clone()));
         }
         let backend = |source| ActionError::Backend { action: NAME.into(), source };
         let most = gpu.limits.max_per_stage_descriptor_sampled_images;
-        let images = key.shapes.iter().flat_map(|(_, volumes)| volumes).flatten().count();
+        let images = key.0.shapes.iter().flat_map(|(_, volumes)| volumes).flatten().count();
         if images > most as usize {
             let wanted = format!("at most {most} on adapter {:?}; draw fewer in a frame", gpu.name());
             return Err(limit("number of volumes".into(), images.to_string(), wanted));
         }
-        let composition = compose_slices(recipes, key.spans, gpu.cuts_loops()).map_err(|e| backend(Box::new(e)))?;
+        let composition = compose_slices(recipes, key.0.spans, sweeps, gpu.cuts_loops());
+        let composition = composition.map_err(|e| backend(Box::new(e)))?;
         let pipeline = Pipeline::new(gpu, &composition, &self.cache).map_err(|e| backend(Box::new(e)))?;
         let (pipeline, layout) = (Arc::new(pipeline), composition.layout);
         if let Err(error) = self.cache.save() {
@@ -246,6 +258,12 @@ impl Drawing {
         })?;
         self.stream.wait()
     }
+}
+
+/// Things in another order.
+fn in_order<T>(things: Vec<T>, order: &[usize]) -> Vec<T> {
+    let mut things: Vec<Option<T>> = things.into_iter().map(Some).collect();
+    order.iter().filter_map(|i| things[*i].take()).collect()
 }
 
 /// What is sliced; items of which nothing is there are left out.

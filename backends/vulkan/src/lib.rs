@@ -1,11 +1,13 @@
 //! Volact's action on GPUs through Vulkan 1.3: slicing.
 //!
 //! # How it draws
-//! Core's [slices](volact_core::slicing) are gathered into *runs*: slabs of one shape, one behind the other,
-//! between which no other shape comes. A run is one draw: a polygon that covers the pixels that see it. Each
-//! fragment cuts its ray by shape, clips and slab, and gathers the run's segments in registers, in f32; from
-//! run to run a pixel's light is kept in a buffer. So the picture is that of ray casting on planes, the
-//! ray's early end and the depth included, and no fixed-function blending rounds it.
+//! Core's [slices](volact_core::slicing) are gathered into *runs*: slabs, one behind the other, of shapes
+//! that overlap. A run is one draw: a polygon that covers the pixels that see it. Each fragment sweeps its
+//! ray between the run's first plane and its last, in registers and in f32, with the functions that ray
+//! casting uses: extinctions of shapes that overlap add, and surfaces of values and slice planes come in
+//! their depth. From run to run a pixel's light is kept in a buffer. So the picture is that of ray casting on
+//! planes, the ray's early end and the depth included, and no fixed-function blending rounds it. A shape
+//! that is one picture, as a maximum, is one run behind all others.
 //!
 //! # Words
 //! | Volact | Vulkan |
@@ -16,8 +18,7 @@
 //! | a frame | one submission, waited for through a timeline semaphore |
 //!
 //! # Known gaps
-//! Refused by name, see [`check`]: geometries other than blocks, slice planes, compositing other than `over`,
-//! pre-interpolated tables, and what is no number in a volume.
+//! Refused by name, see [`check`]: geometries other than blocks, pre-interpolated tables, and what is no number in a volume.
 //!
 //! # Unsafe code
 //! Calls of Vulkan are unsafe. They are in `device` (instance, adapter, device), `memory` (buffers and

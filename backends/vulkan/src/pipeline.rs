@@ -13,7 +13,7 @@ use crate::{
 };
 
 /// Bytes of a corner of a run's polygon.
-pub const CORNER: u32 = 24;
+pub const CORNER: u32 = 28;
 
 /// Bindings of group 0 that shaders see as storage buffers.
 const STORAGE: [u32; 4] = [2, 3, 4, 6];
@@ -152,8 +152,8 @@ impl Pipeline {
             |location, format, offset| vk::VertexInputAttributeDescription { location, binding: 0, format, offset };
         let attributes = [
             attribute(0, vk::Format::R32G32_SFLOAT, 0),
-            attribute(1, vk::Format::R32G32B32_SINT, 8),
-            attribute(2, vk::Format::R32_SFLOAT, 20),
+            attribute(1, vk::Format::R32G32B32A32_SINT, 8),
+            attribute(2, vk::Format::R32_SFLOAT, 24),
         ];
         let input = vk::PipelineVertexInputStateCreateInfo::default()
             .vertex_binding_descriptions(&vertices)

@@ -16,6 +16,9 @@ use crate::{
 /// Bytes of a pixel's light: colour; then what is left, depth, state and number of samples.
 const LIGHT: u64 = 32;
 
+/// The state of a pixel over which pictures of their own were laid.
+const LAID: f32 = 3.0;
+
 const FLAG_BYTES: u64 = 4 * FLAGS as u64;
 
 /// The buffers that a picture is drawn into, and one from which it is read.
@@ -107,7 +110,10 @@ impl Target {
             }
             counts.samples += samples as u64;
             counts.rays += u64::from(samples > 0.0);
-            if let Some([behind, place]) = limits.get(2 * i..2 * i + 2).and_then(|r| <[Row; 2]>::try_from(r).ok()) {
+            // Where pictures of their own were laid over, what is behind is there already.
+            if state != LAID
+                && let Some([behind, place]) = limits.get(2 * i..2 * i + 2).and_then(|r| <[Row; 2]>::try_from(r).ok())
+            {
                 let behind = behind.map(f32::from_bits);
                 let rest = left * (1.0 - behind[3]);
                 let wanted = 1.0 - threshold;

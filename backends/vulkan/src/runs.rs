@@ -1,4 +1,4 @@
-//! Runs: slabs of one shape, one behind the other, between which no other shape comes.
+//! Runs: slabs, one behind the other, of shapes between which no other shape comes.
 
 use bytemuck::{Pod, Zeroable};
 use volact_core::{
@@ -11,12 +11,18 @@ use crate::stream::Polygon;
 /// Rays may end where slabs of these numbers begin, and so do runs.
 const WHOLE: i64 = 32;
 
-/// Slabs of one shape.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// The end of a run beyond which there is nothing of its shapes.
+const OPEN: i32 = i32::MAX;
+
+/// Slabs of some shapes.
+#[derive(Clone, Debug, PartialEq)]
 struct Run {
-    shape: usize,
-    first: i64,
-    end: i64,
+    /// The shapes that it is of, and those among them that reach into it.
+    shapes: [usize; 2],
+    there: Vec<usize>,
+    /// The first slab, and the one after the last; open where there is none.
+    first: Option<i64>,
+    end: Option<i64>,
     levels: [f64; 2],
 }
 
@@ -25,43 +31,112 @@ struct Run {
 #[repr(C)]
 pub struct Corner {
     place: [f32; 2],
-    /// The shape, its first slab, and the one after its last.
-    run: [i32; 3],
+    /// The first shape, the one after the last, the first slab, and the one after the last.
+    run: [i32; 4],
     rest: f32,
 }
 
-/// The runs of a plan from front to back, as polygons of corners. Slabs are counted from `base`; `rest`
-/// is where that one begins, seen from the anchor.
-pub fn corners(slicing: &Slicing<'_>, base: i64, rest: f64) -> (Vec<Corner>, Vec<Polygon>) {
-    let size = slicing.pixel_map().size();
-    let (mut all, mut polygons, mut hull) = (Vec::new(), Vec::new(), Vec::new());
-    for run in runs(slicing) {
-        slicing.cover(run.shape, run.levels, &mut hull);
+/// The slabs of a shape: numbers of the first and of the one after the last, and levels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Reach {
+    numbers: [i64; 2],
+    levels: [f64; 2],
+}
+
+/// Shapes in an order in which each group of shapes that are composited in depth is a stretch, which does
+/// not depend on the view; then the others as they are. With it the groups from front to back, as
+/// stretches of that order. `deep` is how many are composited in depth: the first.
+pub fn in_groups(slicing: &Slicing<'_>, deep: usize) -> (Vec<usize>, Vec<[usize; 2]>) {
+    let members = |group: &Vec<usize>| group.iter().copied().filter(|i| *i < deep).collect::<Vec<_>>();
+    let groups: Vec<Vec<usize>> = slicing.groups().iter().map(members).filter(|g| !g.is_empty()).collect();
+    let mut lasting = groups.clone();
+    lasting.sort_unstable();
+    let order: Vec<usize> = lasting.into_iter().flatten().chain(deep..slicing.solids().len()).collect();
+    let mut places = vec![0; order.len()];
+    order.iter().enumerate().for_each(|(place, i)| places[*i] = place);
+    let stretch = |g: &Vec<usize>| [places[g[0]], places[g[0]] + g.len()];
+    let groups = groups.iter().map(stretch).collect();
+    (order, groups)
+}
+
+/// The runs of a plan from front to back, as polygons of corners; then one for each shape that is a picture
+/// of its own. `groups` are stretches of shapes, as of [`in_groups`]. Slabs are counted from `base`;
+/// `rest` is where that one begins, seen from the anchor.
+pub fn corners(slicing: &Slicing<'_>, groups: &[[usize; 2]], base: i64, rest: f64) -> (Vec<Corner>, Vec<Polygon>) {
+    let (mut all, mut polygons) = (Vec::new(), Vec::new());
+    let number = |n: Option<i64>, open: i32| n.map_or(open, |n| (n - base) as i32);
+    for run in runs(slicing, groups) {
+        let hull = covered(slicing, &run);
         if hull.len() < 3 {
             continue;
         }
         polygons.push(Polygon { first: all.len() as u32, count: hull.len() as u32 });
-        let numbers = [run.shape as i32, (run.first - base) as i32, (run.end - base) as i32];
+        let [from, to] = run.shapes.map(|s| s as i32);
+        let numbers = [from, to, number(run.first, -OPEN), number(run.end, OPEN)];
         all.extend(hull.iter().map(|p| {
-            let place = 2.0 * *p / size - DVec2::ONE;
+            let place = 2.0 * *p / slicing.pixel_map().size() - DVec2::ONE;
             Corner { place: place.as_vec2().to_array(), run: numbers, rest: rest as f32 }
         }));
     }
     (all, polygons)
 }
 
-fn runs(slicing: &Slicing<'_>) -> Vec<Run> {
+/// What a run covers: the hull of one shape, the rectangle around those of several.
+fn covered(slicing: &Slicing<'_>, run: &Run) -> Vec<DVec2> {
+    let mut hull = Vec::new();
+    if let [shape] = run.there[..] {
+        slicing.cover(shape, run.levels, &mut hull);
+        return hull;
+    }
+    let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+    for &shape in &run.there {
+        slicing.cover(shape, run.levels, &mut hull);
+        (low, high) = hull.iter().fold((low, high), |(a, b), p| (a.min(*p), b.max(*p)));
+    }
+    if low.cmplt(high).all() {
+        vec![low, DVec2::new(high.x, low.y), high, DVec2::new(low.x, high.y)]
+    } else {
+        Vec::new()
+    }
+}
+
+fn runs(slicing: &Slicing<'_>, groups: &[[usize; 2]]) -> Vec<Run> {
+    let reaches = reaches(slicing);
     let mut made: Vec<Run> = Vec::new();
+    for &shapes in groups {
+        let members = || (shapes[0]..shapes[1]).filter_map(|s| Some((s, reaches[s]?)));
+        let first = members().map(|(_, r)| r.numbers[0]).min().unwrap_or(0);
+        let end = members().map(|(_, r)| r.numbers[1]).max().unwrap_or(0);
+        for chunk in first.div_euclid(WHOLE)..(end + WHOLE - 1).div_euclid(WHOLE) {
+            let [a, b] = [chunk * WHOLE, (chunk + 1) * WHOLE];
+            let inside = || members().filter(|(_, r)| r.numbers[0] < b && a < r.numbers[1]);
+            let slabs = |shape: usize| [slicing.slabs(shape).slab(a)[0], slicing.slabs(shape).slab(b)[0]];
+            let levels = inside().map(|(s, r)| {
+                let [low, high] = slabs(s);
+                [low.max(r.levels[0]), high.min(r.levels[1])]
+            });
+            let levels = levels.reduce(|x, y| [x[0].min(y[0]), x[1].max(y[1])]);
+            let Some(levels) = levels else { continue };
+            let there = inside().map(|(s, _)| s).collect();
+            made.push(Run { shapes, there, first: (a > first).then_some(a), end: (b < end).then_some(b), levels });
+        }
+    }
+    let deep = groups.iter().map(|g| g[1]).max().unwrap_or(0);
+    let alone =
+        |s: usize| Some(Run { shapes: [s, s + 1], there: vec![s], first: None, end: None, levels: reaches[s]?.levels });
+    made.extend((deep..reaches.len()).filter_map(alone));
+    made
+}
+
+/// What slabs each shape reaches into.
+fn reaches(slicing: &Slicing<'_>) -> Vec<Option<Reach>> {
+    let mut made: Vec<Option<Reach>> = vec![None; slicing.solids().len()];
     let mut sweep = slicing.sweep(Order::FrontToBack);
     while let Some(slice) = sweep.next_slice() {
-        let (shape, number) = (slice.shape, slice.number);
-        match made.last_mut() {
-            Some(run) if run.shape == shape && run.end == number && number % WHOLE != 0 => {
-                run.end += 1;
-                run.levels[1] = slice.slab[1];
-            }
-            _ => made.push(Run { shape, first: number, end: number + 1, levels: slice.slab }),
-        }
+        let (number, slab) = (slice.number, slice.slab);
+        let reach = made[slice.shape].get_or_insert(Reach { numbers: [number, number + 1], levels: slab });
+        reach.numbers = [reach.numbers[0].min(number), reach.numbers[1].max(number + 1)];
+        reach.levels = [reach.levels[0].min(slab[0]), reach.levels[1].max(slab[1])];
     }
     made
 }
@@ -98,26 +173,41 @@ mod tests {
         let (solids, frame) = solids(&[DVec3::ZERO]);
         let sampling = Sampling { rate: Rate::Distance(0.1), ..Sampling::default() };
         let slicing = Slicing::new(solids.iter().collect(), &frame, &sampling).unwrap();
-        let all = runs(&slicing);
-        assert!(all.windows(2).all(|r| r[0].end == r[1].first && r[1].first % WHOLE == 0));
-        let slabs: i64 = all.iter().map(|r| r.end - r.first).sum();
-        assert_eq!(slabs as usize, slicing.step().planes);
-        let (corners, polygons) = corners(&slicing, 64, 0.25);
+        let (order, groups) = in_groups(&slicing, 1);
+        assert_eq!((order, &groups[..]), (vec![0], &[[0, 1]][..]));
+        let all = runs(&slicing, &groups);
+        assert!(all.len() > 3 && all.windows(2).all(|r| r[0].end == r[1].first && r[1].first.unwrap() % WHOLE == 0));
+        assert!(all[0].first.is_none() && all[all.len() - 1].end.is_none());
+        let slabs: f64 = all.iter().map(|r| (r.levels[1] - r.levels[0]) / 0.1).sum();
+        assert_eq!(slabs.round() as usize, slicing.step().planes);
+        let (corners, polygons) = corners(&slicing, &groups, 64, 0.25);
         assert_eq!(polygons.len(), all.len());
         assert!(corners.iter().all(|c| c.place.iter().all(|v| v.abs() < 1.1) && c.rest == 0.25));
-        assert_eq!(i64::from(corners[0].run[1]), all[0].first - 64);
+        let second = &corners[polygons[1].first as usize];
+        assert_eq!(i64::from(second.run[2]), all[1].first.unwrap() - 64);
     }
 
     #[test]
-    fn shapes_that_overlap_take_turns() {
-        let (solids, frame) = solids(&[DVec3::ZERO, DVec3::splat(0.4)]);
+    fn shapes_that_overlap_share_runs_and_others_have_their_own() {
+        let (solids, frame) = solids(&[DVec3::ZERO, DVec3::splat(-30.0), DVec3::splat(0.4)]);
         let sampling = Sampling { rate: Rate::Distance(0.1), ..Sampling::default() };
         let slicing = Slicing::new(solids.iter().collect(), &frame, &sampling).unwrap();
-        let all = runs(&slicing);
-        assert!(all.len() > 50 && all.windows(2).filter(|r| r[0].shape != r[1].shape).count() > 50);
-        for shape in 0..2 {
-            let own: Vec<&Run> = all.iter().filter(|r| r.shape == shape).collect();
-            assert!(own.windows(2).all(|r| r[0].end == r[1].first));
-        }
+        let (order, groups) = in_groups(&slicing, 3);
+        // The first and the third are together, whichever group is in front.
+        assert_eq!(order, [0, 2, 1]);
+        let mut all = groups;
+        all.sort_unstable();
+        assert_eq!(all, [[0, 2], [2, 3]]);
+    }
+
+    #[test]
+    fn pictures_of_their_own_are_one_run_behind_all_others() {
+        let (solids, frame) = solids(&[DVec3::ZERO, DVec3::splat(0.4)]);
+        let slicing = Slicing::new(solids.iter().collect(), &frame, &Sampling::default()).unwrap();
+        let (_, groups) = in_groups(&slicing, 1);
+        let all = runs(&slicing, &groups);
+        let last = &all[all.len() - 1];
+        assert_eq!((last.shapes, last.first, last.end), ([1, 2], None, None));
+        assert!(all[..all.len() - 1].iter().all(|r| r.shapes == [0, 1]));
     }
 }

@@ -176,7 +176,7 @@ impl RenderAction for WgpuAction {
 
     fn manage(&mut self, shape: &Shape) -> Result<(), ActionError> {
         let programs = &self.programs;
-        self.lifecycle.manage(shape, |shape| check(shape, &programs.of(shape)?))?;
+        self.lifecycle.manage(shape, |shape| programs.of(shape).and_then(|_| check(shape)))?;
         log::debug!("wgpu: manages {:?}", shape.name());
         Ok(())
     }
@@ -188,7 +188,7 @@ impl RenderAction for WgpuAction {
     fn begin_draw(&mut self, frame: &FrameDesc) -> Result<(), ActionError> {
         let mut started = Started { at: Instant::now(), uploaded: 0, rebuilt: Vec::new() };
         let programs = &self.programs;
-        let open = self.lifecycle.begin(frame, |shape| check(shape, &programs.of(shape)?))?;
+        let open = self.lifecycle.begin(frame, |shape| programs.of(shape).and_then(|_| check(shape)))?;
         let shapes: Vec<ResolvedShape> = open.shapes.values().cloned().collect();
         let scopes = self.gpu.scopes();
         let prepared = self.prepare(&shapes, &mut started);

@@ -1,7 +1,7 @@
 //! What `wgpu` draws, and the errors for what it does not.
 
 use volact_core::{ActionError, Caps, Compositing, ParameterValue, TableInterpolation, resolve::ResolvedShape};
-use volact_shaders::{Program, unfit};
+use volact_shaders::unfit;
 
 /// The action's name.
 pub const NAME: &str = "wgpu";
@@ -31,30 +31,33 @@ pub fn caps(device: &str) -> Caps {
 ///
 /// # Errors
 /// [`ActionError::Unsupported`], by name and with a cure.
-pub fn check(shape: &ResolvedShape, program: &Program) -> Result<(), ActionError> {
-    match refused(shape, program) {
+pub fn check(shape: &ResolvedShape) -> Result<(), ActionError> {
+    match refused(shape) {
         None => Ok(()),
         Some((what, cure)) => {
-            Err(ActionError::Unsupported { action: NAME.into(), shape: shape.name.clone(), what, cure: cure.into() })
+            Err(ActionError::Unsupported { action: NAME.into(), shape: shape.name.clone(), what, cure })
         }
     }
 }
 
-fn refused(shape: &ResolvedShape, program: &Program) -> Option<(String, &'static str)> {
+fn refused(shape: &ResolvedShape) -> Option<(String, String)> {
     let geometry = &shape.state.geometry;
     if geometry.as_block().is_none() {
-        return Some((format!("geometry {:?}", geometry.name()), "draw it with the action cpu, or take a block"));
+        return Some((
+            format!("geometry {:?}", geometry.name()),
+            "draw it with the action cpu, or take a block".into(),
+        ));
     }
     for (parameter, value) in &shape.parameters {
         match value {
             ParameterValue::Table(t) if t.interpolation() == TableInterpolation::Pre => {
                 return Some((
                     format!("the pre-interpolated table {parameter:?}"),
-                    "let it apply after interpolation, or draw with the action cpu",
+                    "let it apply after interpolation, or draw with the action cpu".into(),
                 ));
             }
             ParameterValue::Attribute(_) => {
-                return Some((format!("the attribute {parameter:?}"), "draw it with the action cpu"));
+                return Some((format!("the attribute {parameter:?}"), "draw it with the action cpu".into()));
             }
             _ => {}
         }

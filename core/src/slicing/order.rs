@@ -88,34 +88,100 @@ impl Solidly {
     }
 }
 
-/// The places of shapes from front to back, twice: where there is no true order, the first goes by
-/// rising identity and the second by falling.
-pub(super) fn ranks(boxes: &[Solidly], ids: &[u64], sight: Sight) -> [Vec<usize>; 2] {
-    let n = boxes.len();
-    if n > MOST_PAIRED {
-        let distance = |i: &usize| match sight {
-            Sight::Eye(eye) => boxes[*i].center.distance(eye),
-            Sight::Along(direction) => boxes[*i].center.dot(direction),
-        };
-        let mut order: Vec<usize> = (0..n).collect();
-        order.sort_by(|a, b| distance(a).total_cmp(&distance(b)).then(ids[*a].cmp(&ids[*b])));
-        let ranks = places(&order);
-        return [ranks.clone(), ranks];
-    }
-    let mut behind: Vec<Vec<usize>> = vec![Vec::new(); n];
-    let mut before = vec![0usize; n];
-    for i in 0..n {
-        for j in i + 1..n {
-            let (front, back) = match boxes[i].relation(&boxes[j], sight) {
-                Relation::Before => (i, j),
-                Relation::Behind => (j, i),
-                Relation::Apart | Relation::Overlap => continue,
+/// The order of shapes.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(super) struct Depths {
+    /// The places of shapes from front to back, twice: where there is no true order, the first goes by
+    /// rising identity and the second by falling.
+    pub ranks: [Vec<usize>; 2],
+    /// Shapes in groups from front to back, of which each lies wholly before the next: in a group they
+    /// overlap, or hide one another in a circle.
+    pub groups: Vec<Vec<usize>>,
+}
+
+impl Depths {
+    /// The order of boxes with these identities.
+    pub fn new(boxes: &[Solidly], ids: &[u64], sight: Sight) -> Self {
+        let n = boxes.len();
+        if n > MOST_PAIRED {
+            let distance = |i: &usize| match sight {
+                Sight::Eye(eye) => boxes[*i].center.distance(eye),
+                Sight::Along(direction) => boxes[*i].center.dot(direction),
             };
-            behind[front].push(back);
-            before[back] += 1;
+            let mut order: Vec<usize> = (0..n).collect();
+            order.sort_by(|a, b| distance(a).total_cmp(&distance(b)).then(ids[*a].cmp(&ids[*b])));
+            let ranks = places(&order);
+            return Self { ranks: [ranks.clone(), ranks], groups: order.into_iter().map(|i| vec![i]).collect() };
+        }
+        let mut behind: Vec<Vec<usize>> = vec![Vec::new(); n];
+        let mut before = vec![0usize; n];
+        let mut together = Vec::new();
+        for i in 0..n {
+            for j in i + 1..n {
+                let (front, back) = match boxes[i].relation(&boxes[j], sight) {
+                    Relation::Before => (i, j),
+                    Relation::Behind => (j, i),
+                    Relation::Overlap => {
+                        together.push([i, j]);
+                        continue;
+                    }
+                    Relation::Apart => continue,
+                };
+                behind[front].push(back);
+                before[back] += 1;
+            }
+        }
+        let ranks = [false, true].map(|falling| places(&sorted(&behind, before.clone(), ids, falling)));
+        for [i, j] in together {
+            behind[i].push(j);
+            behind[j].push(i);
+        }
+        Self { ranks, groups: circles(&behind, ids) }
+    }
+}
+
+/// The strongly connected components of a graph, in topological order (S. R. Kosaraju, after M. Sharir,
+/// *A strong-connectivity algorithm and its applications in data flow analysis*, 1981).
+fn circles(behind: &[Vec<usize>], ids: &[u64]) -> Vec<Vec<usize>> {
+    let n = behind.len();
+    let mut before = vec![Vec::new(); n];
+    (0..n).for_each(|i| behind[i].iter().for_each(|j| before[*j].push(i)));
+    let mut starts: Vec<usize> = (0..n).collect();
+    starts.sort_by_key(|i| std::cmp::Reverse(ids[*i]));
+    let mut seen = vec![false; n];
+    let mut left = Vec::new();
+    starts.into_iter().for_each(|i| walk(i, behind, &mut seen, &mut left));
+    seen.fill(false);
+    let mut groups = Vec::new();
+    for i in left.into_iter().rev() {
+        let mut group = Vec::new();
+        walk(i, &before, &mut seen, &mut group);
+        group.sort_unstable();
+        groups.extend((!group.is_empty()).then_some(group));
+    }
+    groups
+}
+
+/// Goes through all that is reached from a place and was not seen, and tells of places as they are left.
+fn walk(from: usize, next: &[Vec<usize>], seen: &mut [bool], left: &mut Vec<usize>) {
+    if std::mem::replace(&mut seen[from], true) {
+        return;
+    }
+    let mut path = vec![(from, 0)];
+    while let Some((at, taken)) = path.last_mut() {
+        match next[*at].get(*taken) {
+            Some(&to) => {
+                *taken += 1;
+                if !std::mem::replace(&mut seen[to], true) {
+                    path.push((to, 0));
+                }
+            }
+            None => {
+                left.push(*at);
+                path.pop();
+            }
         }
     }
-    [false, true].map(|falling| places(&sorted(&behind, before.clone(), ids, falling)))
 }
 
 /// A topological order; within a cycle by identity.
@@ -153,17 +219,36 @@ mod tests {
         let boxes = [unit_at(0.0, 2.0, 0.0), unit_at(0.0, 0.0, 0.0), unit_at(0.0, 1.0, 0.0)];
         let sight = Sight::Eye(DVec3::new(0.5, -5.0, 0.5));
         for ids in [[1, 2, 3], [3, 2, 1], [2, 3, 1]] {
-            assert_eq!(ranks(&boxes, &ids, sight), [vec![2, 0, 1], vec![2, 0, 1]]);
+            let made = Depths::new(&boxes, &ids, sight);
+            assert_eq!(made.ranks, [vec![2, 0, 1], vec![2, 0, 1]]);
+            assert_eq!(made.groups, [vec![1], vec![2], vec![0]]);
         }
-        let back = ranks(&boxes, &[1, 2, 3], Sight::Along(DVec3::NEG_Y));
-        assert_eq!(back[0], [0, 2, 1]);
+        let back = Depths::new(&boxes, &[1, 2, 3], Sight::Along(DVec3::NEG_Y));
+        assert_eq!(back.ranks[0], [0, 2, 1]);
     }
 
     #[test]
     fn overlapping_shapes_alternate() {
         let boxes = [unit_at(0.0, 0.0, 0.0), unit_at(0.5, 0.5, 0.5), unit_at(0.0, 4.0, 0.0)];
-        let made = ranks(&boxes, &[7, 3, 1], Sight::Along(DVec3::Y));
-        assert_eq!(made, [vec![1, 0, 2], vec![0, 1, 2]]);
+        let made = Depths::new(&boxes, &[7, 3, 1], Sight::Along(DVec3::Y));
+        assert_eq!(made.ranks, [vec![1, 0, 2], vec![0, 1, 2]]);
+        assert_eq!(made.groups, [vec![0, 1], vec![2]]);
+    }
+
+    /// Three bars, each over the next: seen from above none is the first.
+    #[test]
+    fn shapes_that_hide_one_another_in_a_circle_are_a_group() {
+        let bar = |turn: f64| {
+            let place = DAffine3::from_rotation_z(turn) * DAffine3::from_translation(DVec3::X);
+            Solidly::new(
+                Aabb::new(DVec3::new(-0.2, -9.0, -0.1), DVec3::new(0.2, 9.0, 0.1)),
+                &(place * DAffine3::from_rotation_x(0.1)),
+            )
+        };
+        let turn = std::f64::consts::TAU / 3.0;
+        let boxes = [bar(0.0), bar(turn), bar(2.0 * turn), unit_at(0.0, 0.0, -9.0)];
+        let made = Depths::new(&boxes, &[4, 3, 2, 1], Sight::Along(DVec3::NEG_Z));
+        assert_eq!(made.groups, [vec![0, 1, 2], vec![3]]);
     }
 
     #[test]
@@ -188,7 +273,8 @@ mod tests {
             let eye = DVec3::from(eye);
             let direction = DVec3::from(towards) - eye;
             let sight = if many { Sight::Eye(eye) } else { Sight::Along(direction) };
-            let [ranks, _] = ranks(&boxes, &ids, sight);
+            let Depths { ranks: [ranks, _], groups } = Depths::new(&boxes, &ids, sight);
+            prop_assert!(groups.len() == 27 && groups.iter().all(|g| g.len() == 1));
             let met = |i: i32| {
                 let low = DVec3::new(f64::from(i % 3), f64::from(i / 3 % 3), f64::from(i / 9));
                 Aabb::new(low, low + 1.0).clip_line(eye, direction).filter(|t| t[1] - t[0] > 1e-6 && t[0] >= 0.0)

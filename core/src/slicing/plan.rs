@@ -10,7 +10,7 @@ use super::{
     cells::{Cells, Run},
     choice::{clusters, in_order, levels},
     hull::hull,
-    order::{Sight, Solidly, ranks},
+    order::{Depths, Sight, Solidly},
 };
 use crate::{Clip, FrameDesc, LinearRays, Plane, geometry::ClipRegion};
 
@@ -26,8 +26,8 @@ pub struct Slicing<'a> {
     pub(super) parts: Vec<Part<'a>>,
     /// Shapes that are swept together, from front to back.
     pub(super) clusters: Vec<Vec<usize>>,
-    /// Places of shapes from front to back, for slabs of even and of odd number.
-    pub(super) ranks: [Vec<usize>; 2],
+    /// Places of shapes from front to back, for slabs of even and of odd number, and groups.
+    pub(super) depths: Depths,
     pub(super) map: PixelMap,
     pub(super) clip: Clip,
     pub(super) ends: Option<ClipRegion>,
@@ -76,12 +76,12 @@ impl<'a> Slicing<'a> {
         let levels = levels(&solids, &boxes, sampling.mode, &linear);
         let clusters = clusters(&solids, &boxes, &levels, sight)?;
         let ids: Vec<u64> = solids.iter().map(|s| s.id()).collect();
-        let ranks = ranks(&boxes, &ids, sight);
+        let depths = Depths::new(&boxes, &ids, sight);
         let follows = levels.iter().all(|l| matches!(l, Levels::Planes { normal, .. } if *normal == linear.axis));
         let mut made = Self {
             parts: Vec::with_capacity(solids.len()),
-            clusters: in_order(clusters, &ranks[0]),
-            ranks,
+            clusters: in_order(clusters, &depths.ranks[0]),
+            depths,
             map,
             clip: frame.clip.clone(),
             ends: if follows { None } else { ends(&linear) },
@@ -247,6 +247,12 @@ impl<'a> Slicing<'a> {
     /// Where points of the world lie in the picture.
     pub fn pixel_map(&self) -> &PixelMap {
         &self.map
+    }
+
+    /// Shapes in groups from front to back: each group lies wholly before the next. The shapes of one
+    /// overlap, or hide one another in a circle.
+    pub fn groups(&self) -> &[Vec<usize>] {
+        &self.depths.groups
     }
 
     /// Goes through all slices in an order of depth.

@@ -162,7 +162,7 @@ impl<'s> Sweep<'s> {
         }
         if self.ready.len() > 1 {
             let number = self.number(&self.slicing.parts[first.shape], first.position);
-            let ranks = &self.slicing.ranks[(number & 1) as usize];
+            let ranks = &self.slicing.depths.ranks[(number & 1) as usize];
             let back = self.order == Order::BackToFront;
             let place = |h: &Head| if back { usize::MAX - ranks[h.shape] } else { ranks[h.shape] };
             self.ready.make_contiguous().sort_by_key(place);

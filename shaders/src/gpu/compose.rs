@@ -30,9 +30,11 @@ const NUMBER: &str = include_str!("../../wgsl/gpu/number.wgsl");
 const GIVEN: &str = include_str!("../../wgsl/gpu/given.wgsl");
 pub(super) const RAY: &str = include_str!("../../wgsl/gpu/ray.wgsl");
 /// The parts of the stage that casts rays.
-const RAYS: [&str; 7] = [
+const RAYS: [&str; 9] = [
     RAY,
     include_str!("../../wgsl/gpu/rays.wgsl"),
+    include_str!("../../wgsl/gpu/lattice.wgsl"),
+    include_str!("../../wgsl/gpu/ahead.wgsl"),
     include_str!("../../wgsl/gpu/light.wgsl"),
     include_str!("../../wgsl/gpu/over.wgsl"),
     include_str!("../../wgsl/gpu/sweep.wgsl"),
@@ -41,10 +43,14 @@ const RAYS: [&str; 7] = [
 ];
 
 /// The parts of the stage that draws slabs.
-const SLICES: [&str; 4] = [
+const SLICES: [&str; 8] = [
     RAY,
     include_str!("../../wgsl/gpu/rays.wgsl"),
+    include_str!("../../wgsl/gpu/unknown.wgsl"),
     include_str!("../../wgsl/gpu/light.wgsl"),
+    include_str!("../../wgsl/gpu/over.wgsl"),
+    include_str!("../../wgsl/gpu/sweep.wgsl"),
+    include_str!("../../wgsl/gpu/flat.wgsl"),
     include_str!("../../wgsl/gpu/slices.wgsl"),
 ];
 
@@ -68,22 +74,29 @@ pub struct Composition {
 /// # Errors
 /// If something cannot be put together, which would be a fault of this crate.
 pub fn compose(recipes: &[Recipe], spans: u32, planes: bool, watched: bool) -> Result<Composition, ComposeError> {
-    stage(recipes, spans, (planes, watched), &RAYS)
+    stage(recipes, spans, (planes, watched), "", &RAYS)
 }
 
-/// Composes the stages that draw slabs of shapes, all of which are composited in depth: a vertex stage
-/// `volact_corner` and a fragment stage `volact_run`. `spans` and `watched` as for [`compose`].
+/// Composes the stages that draw slabs of shapes, in the order of [`compose`]: a vertex stage
+/// `volact_corner` and a fragment stage `volact_run`. `sweeps` tells that a run may have several shapes,
+/// surfaces of values or slice planes; the rest as for [`compose`].
 ///
 /// # Errors
 /// As [`compose`].
-pub fn compose_slices(recipes: &[Recipe], spans: u32, watched: bool) -> Result<Composition, ComposeError> {
-    stage(recipes, spans, (false, watched), &SLICES)
+pub fn compose_slices(
+    recipes: &[Recipe],
+    spans: u32,
+    sweeps: bool,
+    watched: bool,
+) -> Result<Composition, ComposeError> {
+    stage(recipes, spans, (true, watched), &format!("const ALONES: bool = {};\n", !sweeps), &SLICES)
 }
 
 fn stage(
     recipes: &[Recipe],
     spans: u32,
     (planes, watched): (bool, bool),
+    more: &str,
     texts: &[&str],
 ) -> Result<Composition, ComposeError> {
     let layout = Layout::new(recipes);
@@ -95,7 +108,7 @@ fn stage(
     let alone = deep == 1 && kinds[0] == Compositing::Over && !planes;
     let constants = format!(
         "const SHAPES: u32 = {}u;\nconst DEEP: u32 = {deep}u;\nconst TRACKS: u32 = {}u;\nconst SPANS: u32 = {spans}u;\n\
-         const ALONE: bool = {alone};\n",
+         const ALONE: bool = {alone};\n{more}",
         recipes.len(),
         deep.max(1),
     );

@@ -24,11 +24,6 @@ struct VolactSpans {
     ends: array<vec2<f32>, SPANS>,
 }
 
-// Where segment k of the lattice begins.
-fn volact_border(k: i32) -> f32 { return fma(f32(k), volact_frame.step, f32(k) * volact_frame.step_rest); }
-
-fn volact_first_segment(t: f32) -> i32 { return i32(floor(t / volact_frame.step)); }
-
 // The stretch inside the shape's block: no length where there is none.
 fn volact_block(shape: u32, ray: VolactRay) -> vec2<f32> {
     let p = vec4<f32>(volact_floats(8u * shape).xyz + ray.start, 1.0);
@@ -121,30 +116,6 @@ fn volact_cut(old: VolactSpans, inside: vec2<f32>) -> VolactSpans {
 fn volact_sample(shape: u32, ray: VolactRay, t: f32, step: f32, value: f32) -> Sample {
     let p = volact_floats(8u * shape).xyz + (ray.start + t * ray.direction);
     return Sample(p, ray.direction, step, -ray.direction, t + volact_frame.depth_shift, value);
-}
-
-// For cells of 8³ samples how many around them, with themselves, are empty; 0 where they are not.
-@group(0) @binding(7) var<storage, read> volact_empties: array<u32>;
-
-// Up to where nothing can be seen of a shape from a place on a ray on; the place itself where that is
-// not known.
-fn volact_ahead(shape: u32, ray: VolactRay, t: f32) -> f32 {
-    let grid = volact_numbers[8u * shape + 6u];
-    if grid.y == 0u { return t; }
-    let p = vec4<f32>(volact_floats(8u * shape).xyz + (ray.start + t * ray.direction), 1.0);
-    let row = volact_numbers[8u * shape + 7u].x;
-    let x = vec3<f32>(dot(volact_floats(row), p), dot(volact_floats(row + 1u), p), dot(volact_floats(row + 2u), p));
-    let cell = clamp(vec3<i32>(floor(x / 8.0)), vec3<i32>(0), vec3<i32>(grid.yzw) - 1);
-    let at = u32(cell.x) + grid.y * (u32(cell.y) + grid.z * u32(cell.z));
-    let free = i32(volact_empties[grid.x + at]);
-    if free == 0 { return t; }
-    var left = 3.0e38;
-    for (var a = 0u; a < 3u; a += 1u) {
-        let slope = dot(volact_floats(row + a).xyz, ray.direction);
-        let end = 8.0 * f32(select(cell[a] - free + 1, cell[a] + free, slope > 0.0));
-        if slope != 0.0 { left = min(left, (end - x[a]) / slope); }
-    }
-    return t + max(left, 0.0);
 }
 
 // The segment to go on with where nothing is seen up to some place: not the last of a stretch, which is

@@ -158,7 +158,7 @@ fn volact_cross(shape: u32, ray: VolactRay) {
 // The nearest place without length behind `last`.
 fn volact_next_hit(ray: VolactRay, last: f32) -> f32 {
     var nearest = volact_frame.infinity;
-    for (var shape = 0u; shape < DEEP; shape += 1u) {
+    for (var shape = volact_swept().x; shape < volact_swept().y; shape += 1u) {
         nearest = min(nearest, volact_tracks[shape].crossing);
         let planes = volact_numbers[8u * shape + 5u];
         for (var n = 0u; n < planes.w; n += 1u) {
@@ -177,7 +177,7 @@ fn volact_slice(shape: u32, ray: VolactRay, row: u32) -> f32 {
     let t = (plane.w - dot(plane.xyz, volact_floats(8u * shape).xyz + ray.start)) / slope;
     for (var i = 0u; i < volact_tracks[shape].spans.count; i += 1u) {
         let ends = volact_tracks[shape].spans.ends[i];
-        if t >= ends.x && t <= ends.y { return t; }
+        if t >= ends.x && t <= ends.y && volact_holds(t) { return t; }
     }
     return -3.0e38;
 }
@@ -186,7 +186,7 @@ fn volact_slice(shape: u32, ray: VolactRay, row: u32) -> f32 {
 fn volact_hits(ray: VolactRay, t: f32) {
     var sum = vec4<f32>(0.0);
     var left = 1.0;
-    for (var shape = 0u; shape < DEEP; shape += 1u) {
+    for (var shape = volact_swept().x; shape < volact_swept().y; shape += 1u) {
         let planes = volact_numbers[8u * shape + 5u];
         for (var n = 0u; n < planes.w; n += 1u) {
             if volact_slice(shape, ray, planes.z + n) == t {
@@ -226,7 +226,7 @@ fn volact_on_slice(shape: u32, ray: VolactRay, t: f32) -> vec4<f32> {
 fn volact_mixed(start: f32) -> Medium {
     var sum = vec4<f32>(0.0);
     var dense = vec4<f32>(0.0);
-    for (var shape = 0u; shape < DEEP; shape += 1u) {
+    for (var shape = volact_swept().x; shape < volact_swept().y; shape += 1u) {
         let m = volact_tracks[shape].medium;
         if volact_tracks[shape].start <= start && m.extinction > 0.0 {
             if volact_is_infinite(m.extinction) {
@@ -242,12 +242,12 @@ fn volact_mixed(start: f32) -> Medium {
 }
 
 fn volact_sweep(ray: VolactRay) {
-    for (var shape = 0u; shape < DEEP; shape += 1u) { volact_track(shape, ray); }
+    for (var shape = volact_swept().x; shape < volact_swept().y; shape += 1u) { volact_track(shape, ray); }
     var t = -3.0e38;
     var hit = volact_next_hit(ray, t);
     loop {
         var begin = volact_frame.infinity;
-        for (var shape = 0u; shape < DEEP; shape += 1u) { begin = min(begin, max(volact_tracks[shape].start, t)); }
+        for (var shape = volact_swept().x; shape < volact_swept().y; shape += 1u) { begin = min(begin, max(volact_tracks[shape].start, t)); }
         if hit <= begin {
             if volact_is_infinite(hit) { return; }
             volact_hits(ray, hit);
@@ -256,15 +256,20 @@ fn volact_sweep(ray: VolactRay) {
             continue;
         }
         var end = hit;
-        for (var shape = 0u; shape < DEEP; shape += 1u) {
+        for (var shape = volact_swept().x; shape < volact_swept().y; shape += 1u) {
             let start = volact_tracks[shape].start;
             end = min(end, select(volact_tracks[shape].end, start, start > begin));
         }
         let m = volact_mixed(begin);
         if m.extinction > 0.0 { volact_through(m, begin, end); }
         t = end;
+        // What lies at the very end of a piece comes before the next, with which it would be forgotten.
+        if hit <= t {
+            volact_hits(ray, t);
+            hit = volact_next_hit(ray, t);
+        }
         var surfaces = false;
-        for (var shape = 0u; shape < DEEP; shape += 1u) {
+        for (var shape = volact_swept().x; shape < volact_swept().y; shape += 1u) {
             if volact_tracks[shape].end <= t {
                 let first = volact_tracks[shape].first;
                 let k = volact_tracks[shape].k;

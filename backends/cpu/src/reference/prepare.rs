@@ -78,7 +78,7 @@ pub fn check(shape: &ResolvedShape) -> Result<(), ActionError> {
 pub(super) fn check_with(shape: &ResolvedShape, recognise: bool) -> Result<(), ActionError> {
     match source::look(shape, recognise)? {
         Look::Surface => surfaces::check(shape),
-        Look::Source(program) => source::check(shape, &program),
+        Look::Source(_) => source::check(shape),
         Look::Native(shader) => check_native(shape, shader),
     }
 }

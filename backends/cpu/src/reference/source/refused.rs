@@ -1,7 +1,7 @@
 //! What of shapes with a program is not drawn.
 
 use volact_core::{ActionError, ParameterType, ParameterValue, TableInterpolation, resolve::ResolvedShape};
-use volact_shaders::{Program, unfit};
+use volact_shaders::unfit;
 
 use crate::reference::{
     options::NAME,
@@ -13,10 +13,10 @@ use crate::reference::{
 /// # Errors
 /// [`ActionError::Unsupported`], by name and with a cure, or if an attribute does not go with the
 /// vertices.
-pub(in crate::reference) fn check(shape: &ResolvedShape, program: &Program) -> Result<(), ActionError> {
-    match refused(shape, program) {
+pub(in crate::reference) fn check(shape: &ResolvedShape) -> Result<(), ActionError> {
+    match refused(shape) {
         Some((what, cure)) => {
-            Err(ActionError::Unsupported { action: NAME.into(), shape: shape.name.clone(), what, cure: cure.into() })
+            Err(ActionError::Unsupported { action: NAME.into(), shape: shape.name.clone(), what, cure })
         }
         None if shape.state.geometry.vertex_count().is_none() && has_attributes(shape) => {
             check_attributes(shape, &tessellate(shape)?)
@@ -30,13 +30,13 @@ pub(super) fn has_attributes(shape: &ResolvedShape) -> bool {
     shape.parameters.values().any(|v| v.kind() == ParameterType::Attribute)
 }
 
-fn refused(shape: &ResolvedShape, program: &Program) -> Option<(String, &'static str)> {
+fn refused(shape: &ResolvedShape) -> Option<(String, String)> {
     let name = &shape.shader.declaration.name;
     let before =
         |v: &ParameterValue| matches!(v, ParameterValue::Table(t) if t.interpolation() == TableInterpolation::Pre);
     if shape.parameters.values().any(before) {
         let what = format!("a pre-interpolated table in the evaluated shader {name:?}");
-        return Some((what, "let it apply after interpolation, or use the shader lut and the option recognise"));
+        return Some((what, "let it apply after interpolation, or use the shader lut and the option recognise".into()));
     }
     unfit(shape)
 }
