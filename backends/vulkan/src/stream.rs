@@ -149,8 +149,11 @@ impl Drop for Stream {
         if self.wait().is_err() {
             log::warn!("vulkan: {} did not finish", self.gpu.name());
         }
-        // SAFETY: nothing is in flight any more; both are the device's or null.
+        // SAFETY: nothing is in flight any more; both are the device's or null. Mesa's threads (22.3) still
+        // touch a timeline just after they have signalled it, so that waiting for it is not enough: what is
+        // handed to the queue after that comes after they are done with it.
         unsafe {
+            _ = self.gpu.device.queue_wait_idle(self.queue.raw);
             self.gpu.device.destroy_semaphore(self.semaphore, None);
             self.gpu.device.destroy_command_pool(self.pool, None);
         }
