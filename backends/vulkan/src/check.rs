@@ -72,7 +72,7 @@ pub fn sliced(error: SlicingError) -> ActionError {
     match error {
         SlicingError::Camera(error) => ActionError::Frame(error.into()),
         SlicingError::TooMany { shape, found, wanted } => {
-            limit(format!("number of planes through shape {shape:?}"), found, format!("at most {wanted}"))
+            limit(format!("number of planes, one each sample distance, through shape {shape:?}"), found, format!("at most {wanted}"))
         }
         other => ActionError::Backend { action: NAME.into(), source: Box::new(other) },
     }
