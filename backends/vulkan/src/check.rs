@@ -71,9 +71,11 @@ pub fn limit(what: String, found: String, wanted: String) -> ActionError {
 pub fn sliced(error: SlicingError) -> ActionError {
     match error {
         SlicingError::Camera(error) => ActionError::Frame(error.into()),
-        SlicingError::TooMany { shape, found, wanted } => {
-            limit(format!("number of planes, one each sample distance, through shape {shape:?}"), found, format!("at most {wanted}"))
-        }
+        SlicingError::TooMany { shape, found, wanted } => limit(
+            format!("number of planes, one each sample distance, through shape {shape:?}"),
+            found,
+            format!("at most {wanted}"),
+        ),
         other => ActionError::Backend { action: NAME.into(), source: Box::new(other) },
     }
 }
