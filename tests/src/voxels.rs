@@ -126,7 +126,7 @@ mod tests {
         let off = |i: usize| moved.volume().value([i & 1, i >> 1 & 1, i >> 2], 0) - i as f64 * 100.0;
         assert!((0..8).all(|i| (off(i).abs() - 350.0 / 255.0).abs() < 1e-9));
         assert!((0..8).any(|i| off(i) > 0.0) && (0..8).any(|i| off(i) < 0.0));
-        let whole = Volume::new(VolumeDesc::new([2, 1, 1], ScalarType::U8, 1), vec![3, 4]).unwrap();
+        let whole = Volume::new(VolumeDesc::new([2, 1, 1], ScalarType::U8, 1), vec![3u8, 4]).unwrap();
         assert!(Noise { formats: "r8".into(), seed: 1 }.moved(&VolumeTexture::new(&whole)).is_none());
     }
 }
