@@ -18,7 +18,8 @@
 //! | a frame | one submission, waited for through a timeline semaphore |
 //!
 //! # Known gaps
-//! Refused by name, see [`check`]: geometries other than blocks, pre-interpolated tables, and what is no number in a volume.
+//! Refused by name, see [`check`]: geometries other than blocks, pre-interpolated tables, and what is no number in a
+//! volume where the format has nothing for it.
 //!
 //! # Unsafe code
 //! Calls of Vulkan are unsafe. They are in `device` (instance, adapter, device), `memory` (buffers and
