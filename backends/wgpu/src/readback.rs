@@ -118,14 +118,9 @@ impl Target {
         self.room >= room && self.count >= count
     }
 
-    /// Bytes on the device.
+    /// Bytes on the device, with those from which the host reads.
     pub fn bytes(&self) -> usize {
-        20 * self.room + FLAG_BYTES as usize
-    }
-
-    /// Bytes from which the host reads.
-    pub fn staging_bytes(&self) -> usize {
-        Self::staged(self.count) as usize
+        20 * self.room + Self::staged(self.count) as usize + FLAG_BYTES as usize
     }
 
     fn staged(count: usize) -> u64 {
