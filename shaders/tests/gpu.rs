@@ -4,7 +4,7 @@ use naga::back::spv;
 use volact_core::{ParameterType, ShaderEntry};
 use volact_shaders::{
     Program, builtin,
-    gpu::{self, Recipe, VolumeUse, compose},
+    gpu::{self, Recipe, VolumeUse, compose, compose_slices},
     load,
     signatures::kind_of,
 };
@@ -21,6 +21,9 @@ fn recipe(entry: &ShaderEntry, volume: Option<VolumeUse>) -> Recipe {
 /// Composes, validates and writes; gives the words of SPIR-V.
 fn words(recipes: &[Recipe], spans: u32, planes: bool) -> Vec<u32> {
     compose(recipes, spans, planes, true).unwrap_or_else(|error| panic!("watched: {error}"));
+    for skips in [false, true] {
+        compose_slices(recipes, spans, (planes, skips), true).unwrap_or_else(|error| panic!("slabs: {error}"));
+    }
     let made = compose(recipes, spans, planes, false).unwrap_or_else(|error| panic!("{error}"));
     let options = spv::Options { lang_version: (1, 3), ..spv::Options::default() };
     spv::write_vec(&made.module, &made.info, &options, None).unwrap()
@@ -126,7 +129,8 @@ fn loops_of_authors_ask_for_their_budget() {
 
 #[test]
 fn passes_around_the_march_are_valid() {
-    for (module, info) in [gpu::skip::module().unwrap(), gpu::onto::limits().unwrap(), gpu::onto::onto().unwrap()] {
+    let onto = [gpu::onto::limits(), gpu::onto::onto()];
+    for (module, info) in [gpu::skip::module(), gpu::finish()].into_iter().chain(onto).map(Result::unwrap) {
         let options = spv::Options { lang_version: (1, 3), ..spv::Options::default() };
         assert!(!spv::write_vec(&module, &info, &options, None).unwrap().is_empty());
     }

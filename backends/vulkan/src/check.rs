@@ -1,8 +1,6 @@
 //! What `vulkan` draws, and the errors for what it does not.
 
-use volact_core::{
-    ActionError, Caps, Compositing, ParameterValue, TableInterpolation, resolve::ResolvedShape, slicing::SlicingError,
-};
+use volact_core::{ActionError, Caps, Compositing, ParameterValue, TableInterpolation, resolve::ResolvedShape};
 use volact_shaders::unfit;
 
 /// The action's name.
@@ -58,17 +56,4 @@ fn refused(shape: &ResolvedShape) -> Option<(String, String)> {
 /// The error of a limit that is passed.
 pub fn limit(what: String, found: String, wanted: String) -> ActionError {
     ActionError::Limit { action: NAME.into(), what, found, wanted }
-}
-
-/// Why a frame cannot be sliced, as an error of the action.
-pub fn sliced(error: SlicingError) -> ActionError {
-    match error {
-        SlicingError::Camera(error) => ActionError::Frame(error.into()),
-        SlicingError::TooMany { shape, found, wanted } => limit(
-            format!("number of planes, one each sample distance, through shape {shape:?}"),
-            found,
-            format!("at most {wanted}"),
-        ),
-        other => ActionError::Backend { action: NAME.into(), source: Box::new(other) },
-    }
 }

@@ -3,28 +3,23 @@
 use std::sync::Arc;
 
 use ash::vk;
-use volact_core::{
-    ActionError, Compositing, FrameDesc, Viewport, Volume,
-    frame::Rebuild,
-    glam::DVec3,
-    slicing::{Sampling, Slicing, Solid, Step},
-};
+use volact_core::{ActionError, Compositing, FrameDesc, Viewport, Volume, frame::Rebuild, slicing::Step};
 use volact_shaders::gpu::{
-    Layout, MOST_ROWS, Recipe, compose_slices, is_deep,
+    Layout, MOST_ROWS, Recipe, compose_slices,
     pack::Row,
+    runs::{Corner, Polygon, Sliced, Upward, border, corners},
     scene::{self, Item, Key, Limited, Seen},
 };
 
 use crate::{
-    check::{self, NAME, limit},
+    check::{NAME, limit},
     device::{DeviceError, Gpu},
     memory::{Buffer, Place},
     options::Settings,
     pipeline::{Bound, Cache, Pipeline, Sampler},
     readback::Target,
     resources::{Rows, Volumes},
-    runs::{Corner, corners, in_groups},
-    stream::{Polygon, Stream},
+    stream::Stream,
 };
 
 /// Pipelines that are kept.
@@ -100,39 +95,30 @@ impl Drawing {
         &mut self,
         gpu: &Arc<Gpu>,
         desc: &FrameDesc,
-        mut items: Vec<Item<'_>>,
+        items: Vec<Item<'_>>,
         settings: &Settings,
         rebuilt: &mut Vec<Rebuild>,
     ) -> Result<Drawn, ActionError> {
-        // Those composited in depth come first, in an order that does not depend on that of drawing.
-        items.sort_by_key(|i| if is_deep(i.program.compositing()) { (0, i.shape.id) } else { (1, 0) });
-        let mut solids = solids(&mut items)?;
-        let deep = items.iter().filter(|i| is_deep(i.program.compositing())).count();
-        let mut slicing = plan(&solids, desc, &settings.sampling)?;
-        let (order, groups) = in_groups(&slicing, deep);
-        if !order.is_sorted() {
-            items = in_order(items, &order);
-            solids = in_order(solids, &order);
-            slicing = plan(&solids, desc, &settings.sampling)?;
-        }
+        let sliced = Sliced::new(NAME, items, desc, &settings.sampling)?;
+        let (items, slicing) = (&sliced.items[..], sliced.slicing(NAME, desc, &settings.sampling)?);
+        let groups = sliced.groups(&slicing);
         let step = *slicing.step();
         // Without shapes there is no step, and nothing that needs one.
         let distance = if step.distance > 0.0 { step.distance } else { 1.0 };
-        let seen = Seen::new(desc, &items, distance)?;
+        let seen = Seen::new(desc, items, distance)?;
         let held = |volume: &Volume| self.volumes.held(volume);
         let recipes: Vec<Recipe> = items.iter().map(|i| i.recipe(settings.hardware, held)).collect();
         let sweeps = groups.iter().any(|g| g[1] - g[0] > 1);
-        let (pipeline, layout) = self.pipeline(gpu, (&items, &recipes), sweeps, desc, rebuilt)?;
+        let (pipeline, layout) = self.pipeline(gpu, (items, &recipes), sweeps, desc, rebuilt)?;
         let held = |volume: &Volume| self.volumes.held(volume);
-        let (numbers, tables) = scene::rows((&items, &recipes), (&layout, &seen.anchor), &desc.clip, &[], held);
+        let (numbers, tables) = scene::rows((items, &recipes), (&layout, &seen.anchor), &desc.clip, &[], held);
         let mut uploaded = self.numbers.set(gpu, numbers)? + self.tables.set(gpu, tables)?;
         uploaded += self.set_limits(gpu, seen.limited(desc))?;
         uploaded += self.frame.set(gpu, seen.rows(desc, settings.termination, desc.opaque.is_some()))?;
-        let (base, rest) = border(&seen, distance);
-        let (vertices, polygons) = corners(&slicing, &groups, base, rest);
+        let (vertices, polygons) = corners(&slicing, &groups, border(&seen, distance), Upward::No);
         uploaded += self.set_vertices(gpu, &vertices)?;
         self.make_target(gpu, &seen.viewport)?;
-        self.bind(&items, &pipeline)?;
+        self.bind(items, &pipeline)?;
         self.submit(&pipeline, &seen.viewport, &polygons)?;
         let order = items.iter().map(|i| i.shape.name.clone()).collect();
         Ok(Drawn { shift: seen.shift(), uploaded, order, step, runs: polygons.len() })
@@ -172,7 +158,7 @@ impl Drawing {
             let wanted = format!("at most {most} on adapter {:?}; draw fewer in a frame", gpu.name());
             return Err(limit("number of volumes".into(), images.to_string(), wanted));
         }
-        let composition = compose_slices(recipes, key.0.spans, sweeps, gpu.cuts_loops());
+        let composition = compose_slices(recipes, key.0.spans, (sweeps, false), gpu.cuts_loops());
         let composition = composition.map_err(|e| backend(Box::new(e)))?;
         let pipeline = Pipeline::new(gpu, &composition, &self.cache).map_err(|e| backend(Box::new(e)))?;
         let (pipeline, layout) = (Arc::new(pipeline), composition.layout);
@@ -258,36 +244,4 @@ impl Drawing {
         })?;
         self.stream.wait()
     }
-}
-
-/// Things in another order.
-fn in_order<T>(things: Vec<T>, order: &[usize]) -> Vec<T> {
-    let mut things: Vec<Option<T>> = things.into_iter().map(Some).collect();
-    order.iter().filter_map(|i| things[*i].take()).collect()
-}
-
-/// What is sliced; items of which nothing is there are left out.
-fn solids(items: &mut Vec<Item<'_>>) -> Result<Vec<Solid>, ActionError> {
-    let mut made = Vec::with_capacity(items.len());
-    let mut kept = Vec::with_capacity(items.len());
-    for item in items.drain(..) {
-        if let Some(solid) = Solid::new(item.shape, None)? {
-            made.push(solid);
-            kept.push(item);
-        }
-    }
-    *items = kept;
-    Ok(made)
-}
-
-fn plan<'a>(solids: &'a [Solid], desc: &FrameDesc, sampling: &Sampling) -> Result<Slicing<'a>, ActionError> {
-    Slicing::new(solids.iter().collect(), desc, sampling).map_err(check::sliced)
-}
-
-/// The slab from which slabs are counted on the device, and its level seen from the anchor.
-fn border(seen: &Seen, step: f64) -> (i64, f64) {
-    let linear = seen.grid.linear();
-    let level = linear.axis.dot(seen.anchor.point - linear.eye.unwrap_or(DVec3::ZERO));
-    let base = 32.0 * (level / (32.0 * step)).round();
-    (base as i64, base * step - level)
 }

@@ -37,7 +37,6 @@ pub mod options;
 mod pipeline;
 mod readback;
 mod resources;
-mod runs;
 #[expect(unsafe_code, reason = "Vulkan is called")]
 mod stream;
 

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use ash::vk;
+use volact_shaders::gpu::runs::Polygon;
 
 use crate::{
     device::{DeviceError, Gpu, Queue},
@@ -37,13 +38,6 @@ pub struct Point {
 pub struct Recorder<'a> {
     gpu: &'a Gpu,
     commands: vk::CommandBuffer,
-}
-
-/// A polygon of a run: vertices of the vertex buffer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Polygon {
-    pub first: u32,
-    pub count: u32,
 }
 
 /// Who wrote, and who reads: stages with their accesses.

@@ -113,10 +113,9 @@ impl WgpuAction {
             return Err(ActionError::NotDrawing { call: "end_draw" });
         };
         let drawn: Vec<&ResolvedShape> = open.drawn_shapes().collect();
-        let step = plan::step(&drawn, &self.settings)?;
         let item = |shape| Ok(Item { shape, program: self.programs.of(shape)? });
         let items = drawn.iter().copied().map(item).collect::<Result<Vec<_>, ActionError>>()?;
-        let how = (step, &self.settings, onto);
+        let how = (&self.settings, onto);
         let submitted = self.drawing.submit(&self.gpu, &open.desc, items, how, &mut rebuilt)?;
         uploaded += submitted.uploaded;
         let prepare = at.elapsed();
@@ -132,7 +131,7 @@ impl WgpuAction {
             return Err(overrun(submitted.order.get(number), &drawn, self.gpu.cuts_loops()));
         }
         if counts.cut {
-            return Err(cut_short(NAME, self.gpu.name(), step));
+            return Err(cut_short(NAME, self.gpu.name(), submitted.step));
         }
         frame.warnings = drawn.iter().flat_map(|s| s.warnings.clone()).collect();
         if counts.rays == 0 && !drawn.is_empty() {
@@ -141,7 +140,7 @@ impl WgpuAction {
         }
         frame.warnings.extend(method::adjusted(&drawn, &self.drawing.volumes, &self.settings));
         self.emit(&frame);
-        frame.method = method::method(&drawn, &self.drawing.volumes, step, &self.settings, &self.gpu);
+        frame.method = method::method(&drawn, &self.drawing.volumes, &submitted, &self.settings, &self.gpu);
         let stats = &mut frame.statistics;
         (stats.rays, stats.samples, stats.skipped) = (counts.rays, counts.samples, counts.skipped);
         (stats.prepare, stats.total) = (prepare, at.elapsed());
@@ -150,6 +149,13 @@ impl WgpuAction {
         (stats.uploaded_bytes, stats.rebuilt, stats.threads) = (uploaded, rebuilt, 1);
         let megabytes = format!("{:.3} MB", self.drawing.volumes.bytes() as f64 * 1e-6);
         stats.details.push(("textures".into(), megabytes));
+        if let Some((planes, runs)) = submitted.planes {
+            stats.details.push(("planes".into(), planes.planes.to_string()));
+            stats.details.push(("runs of planes".into(), runs.to_string()));
+        }
+        if submitted.bands > 1 {
+            stats.details.push(("submissions".into(), submitted.bands.to_string()));
+        }
         if let Some(seconds) = counts.seconds {
             stats.details.push(("GPU time".into(), format!("{:.3} ms", seconds * 1e3)));
         }
