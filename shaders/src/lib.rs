@@ -32,4 +32,4 @@ pub use eval::{Environment, Kernel, Machine};
 pub use program::{Entry, Program};
 pub use programs::Programs;
 pub use source::{load, load_folder};
-pub use unfit::unfit;
+pub use unfit::{blunt, unfit};

@@ -1,6 +1,12 @@
 //! What of a shape no action can draw by the source of its shader.
 
-use volact_core::{Compositing, ParameterType, ParameterValue, SliceStyle, resolve::ResolvedShape};
+use volact_core::{
+    Compositing, Filter, LookupTable, ParameterType, ParameterValue, SliceStyle, VolumeTexture, mutated,
+    resolve::ResolvedShape,
+};
+
+/// Numbers that single precision must tell apart between the ends of what a shape shows.
+const TOLD_APART: f64 = 4096.0;
 
 /// What of a shape does not go with its shader's source, whoever draws it, and the cure; `None` where
 /// all does.
@@ -32,6 +38,72 @@ pub fn unfit(shape: &ResolvedShape) -> Option<(String, String)> {
             _ => return None,
         };
         let what = format!("component {wanted} of parameter {name:?} with {count}");
-        (wanted >= count).then(|| (what, format!("name one of 0 to {}", count - 1)))
+        (wanted >= count && !mutated!("component_unchecked")).then(|| (what, format!("name one of 0 to {}", count - 1)))
     })
+}
+
+/// What of a shape single precision has no digits for, where its source computes with values in data
+/// units, and the cure; `None` where it has them.
+///
+/// Values are compared with the tables that they go through and with one another: fine detail on a large
+/// offset (a table from 4e9 to 4e9 + 100, where neighbouring numbers of single precision are 256 apart)
+/// would be a picture of few colours. At least 4096 numbers must lie between the ends of each table, and
+/// between the lowest and the highest value of each volume; labels, looked up at the nearest sample, must
+/// be numbers that single precision has.
+pub fn blunt(shape: &ResolvedShape) -> Option<(String, String)> {
+    let range = shape.parameters.values().find_map(|value| match value {
+        ParameterValue::Volume(texture) => Some(texture.range()),
+        _ => None,
+    });
+    shape.parameters.iter().find_map(|(name, value)| {
+        let [low, high] = match value {
+            ParameterValue::Volume(texture) => shown(texture)?,
+            ParameterValue::Table(table) => ends(table, range.unwrap_or([0.0, 1.0]))?,
+            _ => return None,
+        };
+        let apart = spacing(low.abs().max(high.abs()));
+        let what = format!(
+            "parameter {name:?} with detail from {low} to {high} in a shader that is evaluated in single precision, \
+             whose numbers are {apart} apart there"
+        );
+        let cure = "take the offset off the values and off the table, or draw with the action reference";
+        (high - low < TOLD_APART * apart).then(|| (what, cure.into()))
+    })
+}
+
+/// The lowest and the highest value of a volume; `None` where single precision has each of its values.
+fn shown(texture: &VolumeTexture) -> Option<[f64; 2]> {
+    let desc = texture.volume().desc();
+    let narrow = desc.scalar.size() <= 2 && desc.intercept.abs() <= 65_536.0 * desc.slope.abs();
+    if narrow {
+        return None;
+    }
+    let [low, high] = texture.volume().value_range()?;
+    let whole = texture.filter() == Filter::Nearest && low.abs().max(high.abs()) <= f64::from(1 << 24);
+    (low < high && !whole).then_some([low, high])
+}
+
+/// The first and the last position of a table; `None` where it has but one.
+fn ends(table: &LookupTable, range: [f64; 2]) -> Option<[f64; 2]> {
+    let points = table.points(range);
+    let [low, high] = [points.first()?.value, points.last()?.value];
+    (low < high).then_some([low, high])
+}
+
+/// From a number to the next one of single precision (IEEE 754 binary32, 24 digits).
+fn spacing(value: f64) -> f64 {
+    value.max(f64::from(f32::MIN_POSITIVE)).log2().floor().exp2() * f64::from(f32::EPSILON)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::spacing;
+
+    #[test]
+    fn spacing_is_that_of_single_precision() {
+        for value in [1.0f32, 1.5, 16_777_215.0, 1e7, 4e9, 3e-30, 1e30] {
+            let next = f32::from_bits(value.to_bits() + 1);
+            assert_eq!(spacing(f64::from(value)), f64::from(next) - f64::from(value), "{value}");
+        }
+    }
 }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use ash::vk;
-use volact_core::{ActionError, Compositing, FrameDesc, Viewport, Volume, frame::Rebuild, slicing::Step};
+use volact_core::{ActionError, Compositing, FrameDesc, Viewport, Volume, frame::Rebuild, mutated, slicing::Step};
 use volact_shaders::gpu::{
     Layout, MOST_ROWS, Recipe, compose_slices,
     pack::Row,
@@ -112,7 +112,10 @@ impl Drawing {
         let (pipeline, layout) = self.pipeline(gpu, (items, &recipes), sweeps, desc, rebuilt)?;
         let held = |volume: &Volume| self.volumes.held(volume);
         let (numbers, tables) = scene::rows((items, &recipes), (&layout, &seen.anchor), &desc.clip, &[], held);
-        let mut uploaded = self.numbers.set(gpu, numbers)? + self.tables.set(gpu, tables)?;
+        let mut uploaded = self.numbers.set(gpu, numbers)?;
+        if self.tables.buffer().is_none() || !mutated!("stale_table") {
+            uploaded += self.tables.set(gpu, tables)?;
+        }
         uploaded += self.set_limits(gpu, seen.limited(desc))?;
         uploaded += self.frame.set(gpu, seen.rows(desc, settings.termination, desc.opaque.is_some()))?;
         let (vertices, polygons) = corners(&slicing, &groups, border(&seen, distance), Upward::No);

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use ash::vk;
-use volact_core::{ActionError, Frame, Viewport};
+use volact_core::{ActionError, Frame, Viewport, mutated};
 use volact_shaders::gpu::{CUT_FLAG, FLAGS, pack::Row};
 
 use crate::{
@@ -114,7 +114,7 @@ impl Target {
             if state != LAID
                 && let Some([behind, place]) = limits.get(2 * i..2 * i + 2).and_then(|r| <[Row; 2]>::try_from(r).ok())
             {
-                let behind = behind.map(f32::from_bits);
+                let behind = if mutated!("forgotten_backdrop") { [0.0; 4] } else { behind.map(f32::from_bits) };
                 let rest = left * (1.0 - behind[3]);
                 let wanted = 1.0 - threshold;
                 if rest <= wanted && left > wanted {

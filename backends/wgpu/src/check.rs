@@ -1,7 +1,7 @@
 //! What `wgpu` draws, and the errors for what it does not.
 
 use volact_core::{ActionError, Caps, Compositing, ParameterValue, TableInterpolation, resolve::ResolvedShape};
-use volact_shaders::unfit;
+use volact_shaders::{blunt, unfit};
 
 /// The action's name.
 pub const NAME: &str = "wgpu";
@@ -55,5 +55,5 @@ fn refused(shape: &ResolvedShape) -> Option<(String, String)> {
             _ => {}
         }
     }
-    unfit(shape)
+    unfit(shape).or_else(|| blunt(shape))
 }

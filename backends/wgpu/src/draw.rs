@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use volact_core::{ActionError, FrameDesc, Viewport, Volume, frame::Rebuild, slicing::Step};
+use volact_core::{ActionError, FrameDesc, Viewport, Volume, frame::Rebuild, mutated, slicing::Step};
 use volact_shaders::gpu::{
     Anchor, FrameNumbers, MOST_ROWS, Recipe, WORKGROUP,
     pack::Row,
@@ -118,7 +118,10 @@ impl Drawing {
         let cells = if settings.skipping { self.skipping.cells(&pairs) } else { vec![None; items.len()] };
         let how = (&pipeline.layout, &seen.anchor);
         let (numbers, tables) = scene::rows((items, &recipes), how, &desc.clip, &cells, held);
-        let mut uploaded = self.numbers.set(gpu, numbers)? + self.tables.set(gpu, tables)?;
+        let mut uploaded = self.numbers.set(gpu, numbers)?;
+        if self.tables.buffer().is_none() || !mutated!("stale_table") {
+            uploaded += self.tables.set(gpu, tables)?;
+        }
         let depth = onto.and_then(|onto| onto.depth);
         match depth {
             Some(_) => self.reserve_limits(gpu, &seen.viewport)?,

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use volact_core::{ActionError, ParameterValue, Volume, frame::Rebuild, resolve::ResolvedShape};
+use volact_core::{ActionError, ParameterValue, Volume, frame::Rebuild, mutated, resolve::ResolvedShape};
 use volact_shaders::gpu::{
     pack::Row,
     voxels::{Encoding, Texel, Wanted},
@@ -56,7 +56,7 @@ impl Volumes {
             let ParameterValue::Volume(texture) = value else { continue };
             let volume = texture.volume();
             let held = self.held.get(&volume.id()).filter(|h| h.wanted == settings.format);
-            if held.is_some_and(|h| h.version == volume.version()) {
+            if held.is_some_and(|h| h.version == volume.version() || mutated!("stale_data")) {
                 continue;
             }
             let encoding = Encoding::new(volume, settings.format, gpu.has(wgpu::Features::TEXTURE_FORMAT_16BIT_NORM));

@@ -161,6 +161,8 @@ pub(super) fn validate(module: &Module) -> Result<ModuleInfo, ComposeError> {
 /// Parses texts behind the library and constants.
 pub(super) fn parse(constants: &str, texts: &[&str]) -> Result<Module, ComposeError> {
     let text = [constants, LIBRARY].into_iter().chain(texts.iter().copied()).collect::<Vec<_>>().join("\n");
+    #[cfg(feature = "mutations")]
+    let text = super::faults::made(text);
     naga::front::wgsl::parse_str(&text)
         .map_err(|error| ComposeError::inner(format!("a text of the framework: {}", error.emit_to_string(&text))))
 }

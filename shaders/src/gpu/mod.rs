@@ -20,6 +20,8 @@
 //! All numbers are f32 in [local space](crate::signatures), the origin near the shape.
 
 mod compose;
+#[cfg(feature = "mutations")]
+mod faults;
 mod frame;
 mod layout;
 mod merge;

@@ -3,6 +3,7 @@
 use volact_core::{
     Clip, Compositing, ControlPoint, LookupTable, ParameterType, ParameterValue, SliceStyle, VolumeTexture,
     glam::{DAffine3, DVec3, DVec4},
+    mutated,
     resolve::ResolvedShape,
     volume::Components,
 };
@@ -155,9 +156,11 @@ impl Shape<'_> {
         let shape = self.shape;
         let first = self.number * SHAPE_ROWS as usize;
         let unit = shape.float("unit_distance").unwrap_or(1.0);
-        rows[first] = float3(anchor.point - origin, unit);
+        let point = if mutated!("positions_in_f32") { anchor.point.as_vec3().as_dvec3() } else { anchor.point };
+        rows[first] = float3(point - origin, unit);
         // A box that is nothing in one direction holds no ray; its map is not a number there.
-        let block = shape.block().unwrap_or_else(|| shape.state.geometry.bounds());
+        let block = shape.block().filter(|_| !mutated!("forgotten_roi"));
+        let block = block.unwrap_or_else(|| shape.state.geometry.bounds());
         let unit = DAffine3::from_scale(1.0 / (block.max - block.min)) * DAffine3::from_translation(-block.min);
         let map = unit * shape.to_object * DAffine3::from_translation(origin);
         let empty = !(block.max - block.min).cmpgt(DVec3::ZERO).all();

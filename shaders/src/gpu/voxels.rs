@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use volact_core::{ActionError, ScalarType, Volume, volume::VolumeDesc};
+use volact_core::{ActionError, ScalarType, Volume, mutated, volume::VolumeDesc};
 
 /// The type of a texture's numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -93,6 +93,9 @@ impl Encoding {
         let channels = if desc.components == 3 { 4 } else { desc.components };
         let native = native(desc, unorm16);
         let plain = |texel, code, steps: f64, lowest: f64| {
+            if mutated!("forgotten_slope") {
+                return Self { texel, channels, units: Units { scale: steps, offset: lowest }, code };
+            }
             let units = Units { scale: steps * desc.slope, offset: lowest * desc.slope + desc.intercept };
             Self { texel, channels, units, code }
         };

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use volact_core::{
-    Appearance, Compositing, Declaration, LookupTable, ParameterDecl, ParameterType, ScalarType, ShaderEntry,
-    ShaderText, Shape, Volume, VolumeTexture,
+    Appearance, Camera, Compositing, Declaration, FrameDesc, LookupTable, ParameterDecl, ParameterType, ScalarType,
+    ShaderEntry, ShaderText, Shape, Volume, VolumeTexture,
     glam::{DAffine3, DVec3},
     parameter::Kind,
 };
@@ -297,6 +297,31 @@ fn sources(topic: &mut Topic) {
             rig.lattice("picture", &around([Shape::around(&usual(), look)]), &How::step(0.3)).map(|_| ())
         });
     }
+    let told = "fn shade(s: Sample) -> Medium { \
+                return medium(vec3<f32>(s.depth / 200.0, 0.5 * s.direction.y, 32.0 * s.step), 1.0); }";
+    topic.needing(&needs, "what_a_sample_is_told", "its depth from the eye, direction and length", move |rig| {
+        add(rig, "suite_told", Compositing::Over, told)?;
+        let shape = Shape::around(&ramp(), Appearance::new("suite_told").with("unit_distance", 1.0));
+        let (eye, target) = (DVec3::new(0.5, -100.0, 0.5), DVec3::new(0.5, 0.0, 0.5));
+        let step = 1.0 / 64.0;
+        for (name, camera) in [
+            ("orthographic", Camera::orthographic(eye, target, DVec3::Z, 1e-6)),
+            ("in perspective", Camera::perspective(eye, target, DVec3::Z, 1e-3)),
+        ] {
+            let scene = Scene::new([shape.clone()], FrameDesc::new(camera, 1, 1));
+            let frame = rig.draw(&scene, &How::step(step))?;
+            let [r, g, b, _] = frame.color[0].map(f64::from);
+            // The first sample lies in the middle of a whole segment: the face is 6400 steps from the eye.
+            let wanted = [(100.0 + step / 2.0) / 200.0, 0.5, 0.5];
+            for (label, found, wanted) in [("depth", r, wanted[0]), ("direction", g, wanted[1]), ("step", b, wanted[2])]
+            {
+                // A depth of 100 in f32 as a fraction of 200, and as a difference of two such places.
+                let tolerance = if label == "step" { 32.0 * 100.0 } else { 1.0 } * crate::method::F32;
+                rig.figure(&format!("{label}, {name}"), found, wanted, tolerance);
+            }
+        }
+        Ok(())
+    });
     let slope = "fn shade(s: Sample) -> Medium { let c = abs(volume_coordinates(s.position) - 0.5); \
                  let near = max(c.x, max(c.y, c.z)) < 0.3; \
                  return Medium(0.1 * volume_gradient(s.position) + 0.5, select(0.0, 1.0, near)); }";

@@ -478,3 +478,30 @@ fn attributes_reach_the_program() {
         within("colour", (found / alpha - wanted).abs(), 1e-6);
     }
 }
+
+/// A source computes with values in data units: where single precision has no digits left for their detail,
+/// the shape is refused by name, not drawn in a few colours.
+#[test]
+fn detail_on_a_large_offset_is_drawn_or_refused() {
+    let desc = square(DVec3::new(2.0, 2.5, 3.0), DVec3::new(3.0, -9.0, 4.0), 9.0, 16);
+    let offsets = [(ScalarType::F64, 1e4), (ScalarType::F64, 1e7), (ScalarType::U32, 4e9), (ScalarType::F32, 1e6)];
+    for (scalar, offset) in offsets {
+        let data = volume([5, 6, 7], scalar, |p| (offset + 20.0 * p.x + 9.0 * (p.y - p.z)).round());
+        let table = greys(&[(offset + 20.0, 0.1, 0.0), (offset + 90.0, 0.9, 0.7)]);
+        let shape = [Shape::around(&data, look("lut", table, 1.0))];
+        let [kernel, source] =
+            [true, false].map(|on| draw(&mut *Setup::post(0.2).with("recognise", on).action(), &shape, &desc));
+        let kernel = wide(&kernel.unwrap());
+        assert!(kernel.iter().any(|c| c[3] > 0.3), "{scalar:?}");
+        match source {
+            Ok(source) => {
+                assert!(offset < 1e5, "{scalar:?} at {offset} is drawn");
+                within(&format!("{scalar:?} at {offset}"), max_error(&wide(&source), &kernel), 1e-4);
+            }
+            Err(error) => {
+                let told = error.to_string();
+                assert!(offset > 1e5 && told.contains("\"lookup_table\" with detail from"), "{scalar:?}: {told}");
+            }
+        }
+    }
+}

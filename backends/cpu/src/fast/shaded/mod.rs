@@ -31,7 +31,7 @@ use volact_core::{
     resolve::ResolvedShape,
 };
 use volact_shaders::{
-    Entry, Kernel, Program,
+    Entry, Kernel, Program, blunt,
     eval::{Field, Function, Input, Uniforms},
     signatures::Derived,
     unfit,
@@ -76,7 +76,7 @@ pub fn refused(shape: &ResolvedShape) -> Option<(String, String)> {
             "let it apply after interpolation".into(),
         ));
     }
-    unfit(shape)
+    unfit(shape).or_else(|| blunt(shape))
 }
 
 /// The table of a parameter and the range that it is taken over: a grey one where it was left out.
