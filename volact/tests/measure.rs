@@ -58,6 +58,18 @@ fn compare_draws_the_difference() {
     assert_eq!((same["max"].as_f64(), same["flip"].as_f64(), same["ssim"].as_f64()), (Some(0.0), Some(0.0), Some(1.0)));
     let black = volact_files::picture::load_picture(&path).unwrap();
     assert!(black.rgba.iter().all(|p| *p == [0.0, 0.0, 0.0, 1.0]));
+    // Of a scale the user chooses: from the largest difference on the brightest colour, twice as much of half of it.
+    let pair = ["compare", "volumizer/tables.png", "volumizer/roi.png", "--diff", file];
+    let most = found["max"].as_f64().unwrap();
+    let brightest = |scale: f64| {
+        assert_eq!(volact(&[&pair[..], &["--diff-scale", &scale.to_string()]].concat()).code, 0);
+        let drawn = volact_files::picture::load_picture(&path).unwrap();
+        drawn.rgba.iter().filter(|p| p[0] > 0.985 && p[1] > 0.985).count()
+    };
+    assert_eq!(brightest(4.0 * most), 0);
+    assert!(brightest(most) >= 1 && brightest(most / 2.0) > brightest(most));
+    assert_eq!(volact(&[&pair[..], &["--diff-scale", "0"]].concat()).code, 2);
+    assert_eq!(volact(&["compare", pair[1], pair[2], "--diff-scale", "1"]).code, 2, "there is nothing to scale");
 }
 
 #[test]

@@ -3,6 +3,7 @@
 mod check;
 mod docs;
 mod evaluator;
+mod gpu_report;
 mod header;
 mod mesh_peers;
 mod new_plugin;
@@ -43,6 +44,8 @@ enum Task {
     NewPlugin(new_plugin::Args),
     /// Time shaders that are drawn by evaluating their sources, beside a kernel.
     Evaluator(evaluator::Args),
+    /// Write what the actions on GPUs do on this machine: adapter, figures, the suite's result.
+    GpuReport(gpu_report::Args),
     /// Time `cpu` over picture sizes, volume sizes and threads.
     Scaling,
 }
@@ -59,6 +62,7 @@ fn main() -> anyhow::Result<()> {
         Task::Header => header::run(),
         Task::NewPlugin(args) => new_plugin::run(&args),
         Task::Evaluator(args) => evaluator::run(&args),
+        Task::GpuReport(args) => gpu_report::run(&args),
         Task::Scaling => scaling::run(),
     }
 }

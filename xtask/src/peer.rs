@@ -48,6 +48,11 @@ pub struct Args {
 pub fn run(args: &Args) -> Result<()> {
     let mut registry = Registry::with_core();
     volact_cpu::register(&mut registry)?;
+    #[cfg(feature = "gpu")]
+    {
+        volact_wgpu::register(&mut registry)?;
+        volact_vulkan::register(&mut registry)?;
+    }
     for entry in volact_shaders::builtin().map_err(|problems| anyhow::anyhow!("{problems}"))? {
         if registry.shaders().get(&entry.declaration.name).is_none() {
             registry.add_shader(entry)?;
@@ -91,6 +96,7 @@ pub fn run(args: &Args) -> Result<()> {
         "frames": times.len(), "first_ms": round(first_ms), "cpu": round(busy), "peak_mib": peak_mib(),
         "classification": frame.method.classification, "device": frame.method.device,
         "samples": stats.samples, "skipped": stats.skipped, "resident_bytes": stats.resident_bytes,
+        "volume_bytes": shape.state().volume().map(|t| t.volume().data().bytes().len()),
         "msamples_s": round(stats.samples as f64 / ms / 1e3),
     });
     println!("{row}");

@@ -20,6 +20,11 @@ const UNLIT_MARKS: [&str; 2] = ["<!-- peers: begin -->", "<!-- peers: end -->"];
 const LIT: [&str; 1] = ["ct_shaded_phong_u16"];
 const LIT_MARKS: [&str; 2] = ["<!-- lit peers: begin -->", "<!-- lit peers: end -->"];
 
+/// Where the tables of actions on GPUs go.
+const GPU_MARKS: [&str; 2] = ["<!-- gpu peers: begin -->", "<!-- gpu peers: end -->"];
+/// Peers that draw through a GPU's interface.
+const GPU_PEERS: [&str; 3] = ["vtk-gpu", "vispy", "pygfx"];
+
 /// Arguments of `peers`.
 #[derive(clap::Args)]
 pub struct Args {
@@ -41,11 +46,18 @@ pub struct Args {
     /// The lit scene instead of the unlit ones.
     #[arg(long)]
     lit: bool,
+    /// The actions on GPUs beside peers on GPUs (built with the feature `gpu`).
+    #[arg(long, conflicts_with = "lit")]
+    gpu: bool,
 }
 
 impl Args {
     fn scenes(&self) -> (&'static [&'static str], [&'static str; 2]) {
-        if self.lit { (&LIT, LIT_MARKS) } else { (&UNLIT, UNLIT_MARKS) }
+        match (self.lit, self.gpu) {
+            (true, _) => (&LIT, LIT_MARKS),
+            (_, true) => (&UNLIT, GPU_MARKS),
+            _ => (&UNLIT, UNLIT_MARKS),
+        }
     }
 }
 
@@ -56,7 +68,7 @@ pub fn run(args: &Args) -> Result<()> {
     }
     let text = fs::read_to_string(&args.log).with_context(|| format!("{}: cannot be read", args.log.display()))?;
     let rows: Vec<Value> = text.lines().filter_map(|l| serde_json::from_str(l).ok()).collect();
-    let tables = tables(&rows);
+    let tables = if args.gpu { gpu_tables(&rows) } else { tables(&rows) };
     replace(&args.report, args.scenes().1, &tables)
 }
 
@@ -102,13 +114,23 @@ fn measure(args: &Args) -> Result<()> {
         with("volact-step-4", "4", ""),
         with("volact-step-0.25", "0.25", ""),
     ];
+    let on_gpus = [
+        with("wgpu", "{step}", " --action wgpu"),
+        with("wgpu-2", "2", " --action wgpu"),
+        with("wgpu-4", "4", " --action wgpu"),
+        with("wgpu-slices", "{step}", " --action wgpu --option method=slices"),
+        with("vulkan", "{step}", " --action vulkan"),
+    ];
     let mut command = Command::new(&args.python);
     command.current_dir(&peers).arg("run_all.py").arg("--scenes").args(args.scenes().0);
     command
         .args(["--budget", "1.2", "--rounds", &args.rounds.to_string(), "--log"])
         .arg(&log)
         .arg("--with")
-        .args(&others);
+        .args(if args.gpu { &on_gpus } else { &others });
+    if args.gpu {
+        command.arg("--peers").args(GPU_PEERS);
+    }
     let status = command.status().with_context(|| format!("{}: cannot be run", args.python.display()))?;
     if !status.success() {
         bail!("the peers' driver failed: {status}");
@@ -125,7 +147,8 @@ struct Point {
 
 type Key = (String, String, String);
 
-fn tables(rows: &[Value]) -> String {
+/// The best of all rounds, by scene, view and distance, and there by program.
+fn points(rows: &[Value]) -> BTreeMap<Key, BTreeMap<String, Point>> {
     let mut points: BTreeMap<Key, BTreeMap<String, Point>> = BTreeMap::new();
     for row in rows {
         let text = |k: &str| row[k].as_str().unwrap_or_default().to_owned();
@@ -136,11 +159,92 @@ fn tables(rows: &[Value]) -> String {
             *place = Point { ms, rmse };
         }
     }
+    points
+}
+
+fn tables(rows: &[Value]) -> String {
+    let points = points(rows);
     let mut out = String::new();
     same_distance(&points, &mut out);
     dominated(&points, &mut out);
     scaling(&points, &mut out);
     out
+}
+
+/// For each point of a peer on a GPU the fastest setting of `wgpu` with no more error; slices of the one action
+/// beside those of the other; the first frame and the memory.
+fn gpu_tables(rows: &[Value]) -> String {
+    let points = points(rows);
+    let mut out = String::from(
+        "\n| scene | view | peer | distance | ms / RMSE | wgpu, with no more error | ms / RMSE | times the peer's time |\n\
+         |---|---|---|---|---|---|---|---|\n",
+    );
+    for ((scene, view, step), by_peer) in &points {
+        for (peer, p) in by_peer.iter().filter(|(n, _)| GPU_PEERS.contains(&n.as_str())) {
+            let there = points.iter().filter(|((s, v, _), _)| s == scene && v == view);
+            let settings = there.flat_map(|((.., step), all)| all.iter().map(move |(n, q)| (step, n, *q)));
+            let ours = settings.filter(|(_, n, q)| n.starts_with("wgpu") && q.rmse <= p.rmse);
+            let best = ours.min_by(|a, b| a.2.ms.total_cmp(&b.2.ms));
+            let (by, figures, ratio) = match best {
+                Some((s, n, q)) => (
+                    n.strip_prefix("wgpu-")
+                        .filter(|n| *n != "slices")
+                        .map_or_else(|| format!("{n} at {s}"), |d| format!("wgpu at {d}")),
+                    format!("{:.0} / {:.5}", q.ms, q.rmse),
+                    format!("{:.2}", q.ms / p.ms),
+                ),
+                None => ("**none**".to_owned(), String::new(), String::new()),
+            };
+            let _ = writeln!(
+                out,
+                "| {scene} | {view} | {peer} | {step} | {:.0} / {:.5} | {by} | {figures} | {ratio} |",
+                p.ms, p.rmse
+            );
+        }
+    }
+    slices(&points, &mut out);
+    first_frames(rows, &mut out);
+    out
+}
+
+fn slices(points: &BTreeMap<Key, BTreeMap<String, Point>>, out: &mut String) {
+    out.push_str(
+        "\n| scene | view | distance | `wgpu` rays, ms | `wgpu` slices, ms | `vulkan` slices, ms | vulkan / wgpu slices |\n\
+         |---|---|---|---|---|---|---|\n",
+    );
+    for ((scene, view, step), by) in points {
+        let [Some(rays), Some(slices), Some(vulkan)] = ["wgpu", "wgpu-slices", "vulkan"].map(|n| by.get(n)) else {
+            continue;
+        };
+        let _ = writeln!(
+            out,
+            "| {scene} | {view} | {step} | {:.0} | {:.0} | {:.0} | {:.2} |",
+            rays.ms,
+            slices.ms,
+            vulkan.ms,
+            vulkan.ms / slices.ms
+        );
+    }
+}
+
+fn first_frames(rows: &[Value], out: &mut String) {
+    out.push_str(
+        "\n| scene | view | action | first frame / warm one | memory beside the volume / volume |\n|---|---|---|---|---|\n",
+    );
+    let mine = ["wgpu", "wgpu-slices", "vulkan"];
+    for row in rows.iter().filter(|r| r["step"] == 1.0 && r["peer"].as_str().is_some_and(|p| mine.contains(&p))) {
+        let text = |k: &str| row[k].as_str().unwrap_or_default().to_owned();
+        let number = |k: &str| row[k].as_f64().unwrap_or(f64::NAN);
+        let _ = writeln!(
+            out,
+            "| {} | {} | {} | {:.1} | {:.0} % |",
+            text("scene"),
+            text("view"),
+            text("peer"),
+            number("first_ms") / number("ms"),
+            100.0 * (number("resident_bytes") / number("volume_bytes") - 1.0)
+        );
+    }
 }
 
 fn own(name: &str) -> bool {

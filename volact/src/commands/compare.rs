@@ -46,6 +46,9 @@ pub struct Args {
     /// Write a picture of the differences: FLIP, black where none is seen to yellow
     #[arg(long, value_name = "FILE.png")]
     diff: Option<PathBuf>,
+    /// In that picture show the largest difference of a pixel's channels instead, pale yellow from this one on
+    #[arg(long, value_name = "DIFFERENCE", value_parser = positive, requires = "diff")]
+    diff_scale: Option<f64>,
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -60,7 +63,11 @@ pub fn run(args: Args, _: &Registry) -> anyhow::Result<ExitCode> {
     let found = metrics::compare(&image(&a), &image(&b))
         .with_context(|| format!("cannot compare {} with {}", args.a.display(), args.b.display()))?;
     if let Some(path) = &args.diff {
-        save_heat(path, &found, a.width, a.height)?;
+        let heats = match args.diff_scale {
+            Some(scale) => a.rgba.iter().zip(&b.rgba).map(|(a, b)| (apart(*a, *b) / scale) as f32).collect(),
+            None => found.flip_map.clone(),
+        };
+        save_heat(path, &heats, a.width, a.height)?;
     }
     let passed = args.passed(&found);
     let text = if args.json { to_json(&found, &passed) } else { to_text(&found, &passed) };
@@ -74,6 +81,22 @@ fn threshold(text: &str) -> Result<f64, String> {
         Ok(v) if !v.is_nan() => Ok(v),
         _ => Err(format!("{text:?} is no number")),
     }
+}
+
+/// A number above zero.
+fn positive(text: &str) -> Result<f64, String> {
+    threshold(text).and_then(|v| if v > 0.0 { Ok(v) } else { Err(format!("{text:?} is not above 0")) })
+}
+
+/// The largest difference of two pixels' channels; infinite where one of them is no number.
+fn apart(a: [f32; 4], b: [f32; 4]) -> f64 {
+    let channel = |c: usize| (f64::from(a[c]) - f64::from(b[c])).abs();
+    (0..4).map(channel).fold(0.0, |most, d| if d.is_nan() { f64::INFINITY } else { most.max(d) })
+}
+
+/// A difference with digits that tell, however small it is.
+fn figure(v: f64) -> String {
+    if v != 0.0 && v < 1e-4 { format!("{v:.2e}") } else { format!("{v:.6}") }
 }
 
 impl Args {
@@ -121,8 +144,8 @@ fn to_text(found: &Differences, passed: &[String]) -> String {
     let most = if found.max > 0.0 { format!(" in column {x}, row {y}") } else { String::new() };
     let ssim = found.ssim.map_or("none below 11 pixels on a side".into(), |v| format!("{v:.6}"));
     _ = writeln!(text, "differing  {} of {} pixels", found.differing, found.flip_map.len());
-    _ = writeln!(text, "max        {:.6}{most}", found.max);
-    _ = writeln!(text, "rmse       {:.6}", found.rmse);
+    _ = writeln!(text, "max        {}{most}", figure(found.max));
+    _ = writeln!(text, "rmse       {}", figure(found.rmse));
     _ = writeln!(text, "psnr       {:.2} dB", found.psnr);
     _ = writeln!(text, "ssim       {ssim}");
     _ = writeln!(text, "flip       {:.6}", found.flip);
@@ -149,10 +172,10 @@ fn to_json(found: &Differences, passed: &[String]) -> String {
     format!("{value:#}\n")
 }
 
-fn save_heat(path: &Path, found: &Differences, width: usize, height: usize) -> anyhow::Result<()> {
+fn save_heat(path: &Path, heats: &[f32], width: usize, height: usize) -> anyhow::Result<()> {
     let bounds = Aabb::new(DVec3::ZERO, DVec3::ONE);
     let mut frame = Frame::empty(&FrameDesc::new(Camera::fit(&bounds, View::Front, width, height), width, height));
-    frame.color = found.flip_map.iter().map(|&v| heat(v)).collect();
+    frame.color = heats.iter().map(|&v| heat(v)).collect();
     picture::save_png(path, &frame, PngOptions::default())?;
     Ok(())
 }
@@ -180,7 +203,7 @@ mod tests {
 
     fn args(max: Option<f64>, psnr: Option<f64>) -> Args {
         let (a, b) = ("a.png".into(), "b.png".into());
-        Args { a, b, max, rmse: None, psnr, ssim: None, flip: None, diff: None, json: false }
+        Args { a, b, max, rmse: None, psnr, ssim: None, flip: None, diff: None, diff_scale: None, json: false }
     }
 
     fn differences(value: f32) -> Differences {
