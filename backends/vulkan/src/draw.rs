@@ -1,16 +1,18 @@
 //! One picture: what is drawn becomes rows of numbers, polygons and a submission.
 
-use std::sync::Arc;
+use std::{borrow::Cow, sync::Arc};
 
 use ash::vk;
 use volact_core::{
-    ActionError, Compositing, FrameDesc, Viewport, Volume,
+    ActionError, Block, Compositing, FrameDesc, Geometry, ParameterValue, Viewport, Volume,
     frame::Rebuild,
     glam::DVec3,
+    resolve::ResolvedShape,
     slicing::{Sampling, Slicing, Solid, Step},
 };
 use volact_shaders::gpu::{
     Layout, MOST_ROWS, Recipe, compose_slices, is_deep,
+    mesh::{Meshes, is_mesh},
     pack::Row,
     scene::{self, Item, Key, Limited, Seen},
 };
@@ -38,9 +40,12 @@ pub struct Drawing {
     cache: Cache,
     /// Volumes on the device.
     pub volumes: Volumes,
+    /// Meshes, packed.
+    pub meshes: Meshes,
     frame: Rows,
     numbers: Rows,
     tables: Rows,
+    mesh_rows: Rows,
     limits: Rows,
     limit_rows: Vec<Row>,
     limited: Option<Limited>,
@@ -78,9 +83,11 @@ impl Drawing {
             pipelines: Vec::new(),
             cache: Cache::new(gpu, settings.cache.clone())?,
             volumes: Volumes::new(gpu)?,
+            meshes: Meshes::default(),
             frame: Rows::new("volact frame", vk::BufferUsageFlags::UNIFORM_BUFFER),
             numbers: Rows::uniform("volact numbers", MOST_ROWS),
             tables: storage("volact tables"),
+            mesh_rows: storage("volact meshes"),
             limits: storage("volact limits"),
             limit_rows: Vec::new(),
             limited: None,
@@ -100,13 +107,13 @@ impl Drawing {
         &mut self,
         gpu: &Arc<Gpu>,
         desc: &FrameDesc,
-        mut items: Vec<Item<'_>>,
+        (mut items, surfaces): (Vec<Item<'_>>, &[&ResolvedShape]),
         settings: &Settings,
         rebuilt: &mut Vec<Rebuild>,
     ) -> Result<Drawn, ActionError> {
         // Those composited in depth come first, in an order that does not depend on that of drawing.
         items.sort_by_key(|i| if is_deep(i.program.compositing()) { (0, i.shape.id) } else { (1, 0) });
-        let mut solids = solids(&mut items)?;
+        let mut solids = solids(&mut items, &self.meshes)?;
         let deep = items.iter().filter(|i| is_deep(i.program.compositing())).count();
         let mut slicing = plan(&solids, desc, &settings.sampling)?;
         let (order, groups) = in_groups(&slicing, deep);
@@ -118,18 +125,21 @@ impl Drawing {
         let step = *slicing.step();
         // Without shapes there is no step, and nothing that needs one.
         let distance = if step.distance > 0.0 { step.distance } else { 1.0 };
-        let seen = Seen::new(desc, &items, distance)?;
+        let seen = Seen::new(desc, (&items, surfaces), distance)?;
         let held = |volume: &Volume| self.volumes.held(volume);
         let recipes: Vec<Recipe> = items.iter().map(|i| i.recipe(settings.hardware, held)).collect();
         let sweeps = groups.iter().any(|g| g[1] - g[0] > 1);
-        let (pipeline, layout) = self.pipeline(gpu, (&items, &recipes), sweeps, desc, rebuilt)?;
+        let all = (&items[..], &recipes[..], surfaces);
+        let (pipeline, layout) = self.pipeline(gpu, all, sweeps, desc, rebuilt)?;
+        let mut uploaded = self.set_meshes(gpu)?;
         let held = |volume: &Volume| self.volumes.held(volume);
-        let (numbers, tables) = scene::rows((&items, &recipes), (&layout, &seen.anchor), &desc.clip, &[], held);
-        let mut uploaded = self.numbers.set(gpu, numbers)? + self.tables.set(gpu, tables)?;
+        let how = (&layout, &seen.anchor);
+        let (numbers, tables, numbered) = scene::rows(all, how, &desc.clip, (&[], &self.meshes), held);
+        uploaded += self.numbers.set(gpu, numbers)? + self.tables.set(gpu, tables)?;
         uploaded += self.set_limits(gpu, seen.limited(desc))?;
-        uploaded += self.frame.set(gpu, seen.rows(desc, settings.termination, desc.opaque.is_some()))?;
+        uploaded += self.frame.set(gpu, seen.rows(desc, settings.termination, desc.opaque.is_some(), numbered))?;
         let (base, rest) = border(&seen, distance);
-        let (vertices, polygons) = corners(&slicing, &groups, base, rest);
+        let (vertices, polygons) = corners(&slicing, &groups, (base, rest), !surfaces.is_empty());
         uploaded += self.set_vertices(gpu, &vertices)?;
         self.make_target(gpu, &seen.viewport)?;
         self.bind(&items, &pipeline)?;
@@ -146,21 +156,22 @@ impl Drawing {
     /// Bytes on the device besides volumes and pictures.
     pub fn bytes(&self) -> usize {
         let vertices = self.vertices.as_ref().map_or(0, |v| v.size() as usize);
-        self.frame.bytes() + self.numbers.bytes() + self.tables.bytes() + self.limits.bytes() + vertices
+        let rows = [&self.frame, &self.numbers, &self.tables, &self.mesh_rows, &self.limits];
+        rows.map(Rows::bytes).iter().sum::<usize>() + vertices
     }
 
     /// The pipeline of these shapes, compiled once.
     fn pipeline(
         &mut self,
         gpu: &Arc<Gpu>,
-        (items, recipes): (&[Item<'_>], &[Recipe]),
+        (items, recipes, surfaces): (&[Item<'_>], &[Recipe], &[&ResolvedShape]),
         together: bool,
         desc: &FrameDesc,
         rebuilt: &mut Vec<Rebuild>,
     ) -> Result<(Arc<Pipeline>, Layout), ActionError> {
-        let key = Key::new(NAME, items, recipes, &desc.clip)?;
-        let surfaces = items.iter().any(|i| i.program.compositing() == Compositing::First);
-        let sweeps = together || surfaces || key.planes;
+        let key = Key::new(NAME, (items, surfaces), recipes, &desc.clip)?;
+        let crossings = items.iter().any(|i| i.program.compositing() == Compositing::First);
+        let sweeps = together || crossings || key.planes;
         let key = (key, sweeps);
         if let Some((_, pipeline, layout)) = self.pipelines.iter().find(|(k, ..)| *k == key) {
             return Ok((Arc::clone(pipeline), layout.clone()));
@@ -172,7 +183,7 @@ impl Drawing {
             let wanted = format!("at most {most} on adapter {:?}; draw fewer in a frame", gpu.name());
             return Err(limit("number of volumes".into(), images.to_string(), wanted));
         }
-        let composition = compose_slices(recipes, key.0.spans, sweeps, gpu.cuts_loops());
+        let composition = compose_slices(recipes, key.0.spans, (sweeps, key.0.surfaces), gpu.cuts_loops());
         let composition = composition.map_err(|e| backend(Box::new(e)))?;
         let pipeline = Pipeline::new(gpu, &composition, &self.cache).map_err(|e| backend(Box::new(e)))?;
         let (pipeline, layout) = (Arc::new(pipeline), composition.layout);
@@ -187,6 +198,16 @@ impl Drawing {
         }
         self.pipelines.push((key, Arc::clone(&pipeline), layout.clone()));
         Ok((pipeline, layout))
+    }
+
+    /// The rows of meshes, where they have changed.
+    fn set_meshes(&mut self, gpu: &Arc<Gpu>) -> Result<usize, ActionError> {
+        let Some(rows) = self.meshes.rows() else { return Ok(0) };
+        let set = self.mesh_rows.set(gpu, rows);
+        if set.is_err() {
+            self.meshes.forget();
+        }
+        set
     }
 
     /// What the application has drawn, where it has changed.
@@ -232,16 +253,18 @@ impl Drawing {
     /// Binds anew where anything that is bound is another.
     fn bind(&mut self, items: &[Item<'_>], pipeline: &Arc<Pipeline>) -> Result<(), ActionError> {
         let volumes: Vec<_> = items.iter().flat_map(Item::volumes).filter_map(|v| self.volumes.get(v)).collect();
-        let rows = [&self.frame, &self.numbers, &self.tables, &self.limits];
+        let rows = [&self.frame, &self.numbers, &self.tables, &self.limits, &self.mesh_rows];
         let Some(target) = &self.target else { return Ok(()) };
         let mut made_of = vec![Arc::as_ptr(pipeline) as u64, target.generation];
         made_of.extend(rows.iter().map(|r| r.generation).chain(volumes.iter().map(|v| v.generation)));
         if self.bound.as_ref().is_some_and(|(b, _)| *b == made_of) {
             return Ok(());
         }
-        let [Some(frame), Some(numbers), Some(tables), Some(limits)] = rows.map(Rows::buffer) else { return Ok(()) };
+        let [Some(frame), Some(numbers), Some(tables), Some(limits), Some(meshes)] = rows.map(Rows::buffer) else {
+            return Ok(());
+        };
         let images: Vec<_> = volumes.iter().map(|v| &v.image).collect();
-        let buffers = [frame, numbers, tables, limits, &target.light, &target.flags];
+        let buffers = [frame, numbers, tables, limits, &target.light, &target.flags, meshes];
         self.bound = Some((made_of, pipeline.bind(buffers, &self.sampler, &images)?));
         Ok(())
     }
@@ -266,12 +289,27 @@ fn in_order<T>(things: Vec<T>, order: &[usize]) -> Vec<T> {
     order.iter().filter_map(|i| things[*i].take()).collect()
 }
 
+/// A shape for its slabs: of a mesh the box around it, in which fragments find the mesh themselves.
+/// `None` where it has no extent.
+fn boxed<'a>(shape: &'a ResolvedShape, meshes: &Meshes) -> Option<Cow<'a, ResolvedShape>> {
+    if !is_mesh(shape) {
+        return Some(Cow::Borrowed(shape));
+    }
+    let bounds = meshes.bounds(shape)?;
+    let block: Arc<dyn Geometry> = Arc::new(Block::new(bounds.min, bounds.size()).ok()?);
+    let mut made = shape.clone();
+    made.state.geometry = block;
+    made.parameters.retain(|_, value| !matches!(value, ParameterValue::Attribute(_)));
+    Some(Cow::Owned(made))
+}
+
 /// What is sliced; items of which nothing is there are left out.
-fn solids(items: &mut Vec<Item<'_>>) -> Result<Vec<Solid>, ActionError> {
+fn solids(items: &mut Vec<Item<'_>>, meshes: &Meshes) -> Result<Vec<Solid>, ActionError> {
     let mut made = Vec::with_capacity(items.len());
     let mut kept = Vec::with_capacity(items.len());
     for item in items.drain(..) {
-        if let Some(solid) = Solid::new(item.shape, None)? {
+        let Some(shape) = boxed(item.shape, meshes) else { continue };
+        if let Some(solid) = Solid::new(&shape, None)? {
             made.push(solid);
             kept.push(item);
         }

@@ -60,12 +60,18 @@ pub fn in_groups(slicing: &Slicing<'_>, deep: usize) -> (Vec<usize>, Vec<[usize;
 }
 
 /// The runs of a plan from front to back, as polygons of corners; then one for each shape that is a picture
-/// of its own. `groups` are stretches of shapes, as of [`in_groups`]. Slabs are counted from `base`;
+/// of its own; between these, where there are `surfaces`, one of no shape over the whole picture. `groups` are
+/// stretches of shapes, as of [`in_groups`]. Slabs are counted from `base`;
 /// `rest` is where that one begins, seen from the anchor.
-pub fn corners(slicing: &Slicing<'_>, groups: &[[usize; 2]], base: i64, rest: f64) -> (Vec<Corner>, Vec<Polygon>) {
+pub fn corners(
+    slicing: &Slicing<'_>,
+    groups: &[[usize; 2]],
+    (base, rest): (i64, f64),
+    surfaces: bool,
+) -> (Vec<Corner>, Vec<Polygon>) {
     let (mut all, mut polygons) = (Vec::new(), Vec::new());
     let number = |n: Option<i64>, open: i32| n.map_or(open, |n| (n - base) as i32);
-    for run in runs(slicing, groups) {
+    for run in runs(slicing, groups, surfaces) {
         let hull = covered(slicing, &run);
         if hull.len() < 3 {
             continue;
@@ -81,9 +87,13 @@ pub fn corners(slicing: &Slicing<'_>, groups: &[[usize; 2]], base: i64, rest: f6
     (all, polygons)
 }
 
-/// What a run covers: the hull of one shape, the rectangle around those of several.
+/// What a run covers: the hull of one shape, the rectangle around those of several, all where it is of none.
 fn covered(slicing: &Slicing<'_>, run: &Run) -> Vec<DVec2> {
     let mut hull = Vec::new();
+    if run.there.is_empty() {
+        let size = slicing.pixel_map().size();
+        return vec![DVec2::ZERO, DVec2::new(size.x, 0.0), size, DVec2::new(0.0, size.y)];
+    }
     if let [shape] = run.there[..] {
         slicing.cover(shape, run.levels, &mut hull);
         return hull;
@@ -100,7 +110,7 @@ fn covered(slicing: &Slicing<'_>, run: &Run) -> Vec<DVec2> {
     }
 }
 
-fn runs(slicing: &Slicing<'_>, groups: &[[usize; 2]]) -> Vec<Run> {
+fn runs(slicing: &Slicing<'_>, groups: &[[usize; 2]], surfaces: bool) -> Vec<Run> {
     let reaches = reaches(slicing);
     let mut made: Vec<Run> = Vec::new();
     for &shapes in groups {
@@ -122,6 +132,9 @@ fn runs(slicing: &Slicing<'_>, groups: &[[usize; 2]]) -> Vec<Run> {
         }
     }
     let deep = groups.iter().map(|g| g[1]).max().unwrap_or(0);
+    if surfaces {
+        made.push(Run { shapes: [deep; 2], there: Vec::new(), first: None, end: None, levels: [0.0; 2] });
+    }
     let alone =
         |s: usize| Some(Run { shapes: [s, s + 1], there: vec![s], first: None, end: None, levels: reaches[s]?.levels });
     made.extend((deep..reaches.len()).filter_map(alone));
@@ -175,12 +188,12 @@ mod tests {
         let slicing = Slicing::new(solids.iter().collect(), &frame, &sampling).unwrap();
         let (order, groups) = in_groups(&slicing, 1);
         assert_eq!((order, &groups[..]), (vec![0], &[[0, 1]][..]));
-        let all = runs(&slicing, &groups);
+        let all = runs(&slicing, &groups, false);
         assert!(all.len() > 3 && all.windows(2).all(|r| r[0].end == r[1].first && r[1].first.unwrap() % WHOLE == 0));
         assert!(all[0].first.is_none() && all[all.len() - 1].end.is_none());
         let slabs: f64 = all.iter().map(|r| (r.levels[1] - r.levels[0]) / 0.1).sum();
         assert_eq!(slabs.round() as usize, slicing.step().planes);
-        let (corners, polygons) = corners(&slicing, &groups, 64, 0.25);
+        let (corners, polygons) = corners(&slicing, &groups, (64, 0.25), false);
         assert_eq!(polygons.len(), all.len());
         assert!(corners.iter().all(|c| c.place.iter().all(|v| v.abs() < 1.1) && c.rest == 0.25));
         let second = &corners[polygons[1].first as usize];
@@ -205,7 +218,7 @@ mod tests {
         let (solids, frame) = solids(&[DVec3::ZERO, DVec3::splat(0.4)]);
         let slicing = Slicing::new(solids.iter().collect(), &frame, &Sampling::default()).unwrap();
         let (_, groups) = in_groups(&slicing, 1);
-        let all = runs(&slicing, &groups);
+        let all = runs(&slicing, &groups, false);
         let last = &all[all.len() - 1];
         assert_eq!((last.shapes, last.first, last.end), ([1, 2], None, None));
         assert!(all[..all.len() - 1].iter().all(|r| r.shapes == [0, 1]));

@@ -2,9 +2,10 @@
 
 use std::sync::Arc;
 
-use volact_core::{ActionError, FrameDesc, Viewport, Volume, frame::Rebuild};
+use volact_core::{ActionError, FrameDesc, Viewport, Volume, frame::Rebuild, resolve::ResolvedShape};
 use volact_shaders::gpu::{
     Anchor, FrameNumbers, MOST_ROWS, Recipe, WORKGROUP, is_deep,
+    mesh::Meshes,
     pack::Row,
     scene::{self, Item, Key, Limited, Seen},
     skip::Cells,
@@ -27,9 +28,12 @@ pub struct Drawing {
     pipelines: Pipelines,
     /// Volumes on the device.
     pub volumes: Volumes,
+    /// Meshes, packed.
+    pub meshes: Meshes,
     frame: Rows,
     numbers: Rows,
     tables: Rows,
+    mesh_rows: Rows,
     limits: Rows,
     limited: Option<Limited>,
     skipping: Skipping,
@@ -63,9 +67,11 @@ impl Default for Drawing {
         Self {
             pipelines: Pipelines::default(),
             volumes: Volumes::default(),
+            meshes: Meshes::default(),
             frame: Rows::uniform("volact frame", size_of::<FrameNumbers>() / size_of::<Row>()),
             numbers: Rows::uniform("volact numbers", MOST_ROWS),
             tables: Rows::storage("volact tables"),
+            mesh_rows: Rows::storage("volact meshes"),
             limits: Rows::storage("volact limits"),
             limited: None,
             skipping: Skipping::default(),
@@ -87,16 +93,17 @@ impl Drawing {
         &mut self,
         gpu: &Gpu,
         desc: &FrameDesc,
-        mut items: Vec<Item<'_>>,
+        (mut items, surfaces): (Vec<Item<'_>>, &[&ResolvedShape]),
         (step, settings, onto): (f64, &Settings, Option<&Onto<'_>>),
         rebuilt: &mut Vec<Rebuild>,
     ) -> Result<Drawn, ActionError> {
         // Those composited in depth come first, in an order that does not depend on that of drawing.
         items.sort_by_key(|i| if is_deep(i.program.compositing()) { (0, i.shape.id) } else { (1, 0) });
-        let seen = Seen::new(desc, &items, step)?;
+        let seen = Seen::new(desc, (&items, surfaces), step)?;
+        let mut uploaded = self.set_meshes(gpu)?;
         let held = |volume: &Volume| self.volumes.held(volume);
         let recipes: Vec<Recipe> = items.iter().map(|i| i.recipe(settings.hardware, held)).collect();
-        let key = Key::new(NAME, &items, &recipes, &desc.clip)?;
+        let key = Key::new(NAME, (&items, surfaces), &recipes, &desc.clip)?;
         let (pipeline, anew) = self.pipelines.get(gpu, key, &recipes)?;
         if anew {
             rebuilt.push(Rebuild { shape: NAME.into(), what: "pipeline".into(), bytes: 0 });
@@ -104,15 +111,16 @@ impl Drawing {
         let pairs: Vec<_> = items.iter().map(|i| (i.shape, &i.program)).collect();
         let cells = if settings.skipping { self.skipping.cells(&pairs) } else { vec![None; items.len()] };
         let how = (&pipeline.layout, &seen.anchor);
-        let (numbers, tables) = scene::rows((&items, &recipes), how, &desc.clip, &cells, held);
-        let mut uploaded = self.numbers.set(gpu, numbers)? + self.tables.set(gpu, tables)?;
+        let all = (&items[..], &recipes[..], surfaces);
+        let (numbers, tables, surfaces) = scene::rows(all, how, &desc.clip, (&cells, &self.meshes), held);
+        uploaded += self.numbers.set(gpu, numbers)? + self.tables.set(gpu, tables)?;
         let depth = onto.and_then(|onto| onto.depth);
         match depth {
             Some(_) => self.reserve_limits(gpu, &seen.viewport)?,
             None => uploaded += self.upload_limits(gpu, seen.limited(desc))?,
         }
         let limited = desc.opaque.is_some() || depth.is_some();
-        uploaded += self.frame.set(gpu, seen.rows(desc, settings.termination, limited))?;
+        uploaded += self.frame.set(gpu, seen.rows(desc, settings.termination, limited, surfaces))?;
         self.make_target(gpu, &seen.viewport)?;
         self.skipping.buffer(gpu, &cells)?;
         self.find_empty(gpu, &items, &cells, &pipeline, rebuilt)?;
@@ -129,7 +137,8 @@ impl Drawing {
 
     /// Bytes on the device besides volumes and pictures.
     pub fn bytes(&self) -> usize {
-        self.frame.bytes() + self.numbers.bytes() + self.tables.bytes() + self.limits.bytes() + self.skipping.bytes()
+        let rows = [&self.frame, &self.numbers, &self.tables, &self.mesh_rows, &self.limits];
+        rows.map(Rows::bytes).iter().sum::<usize>() + self.skipping.bytes()
     }
 
     fn find_empty(
@@ -145,6 +154,16 @@ impl Drawing {
         let items: Vec<_> = items.iter().zip(cells).map(|(i, cells)| (i.shape, &i.program, *cells)).collect();
         let there = (&self.volumes, &pipeline.layout, [frame, numbers, tables]);
         self.skipping.find(gpu, &items, there, rebuilt)
+    }
+
+    /// The rows of meshes, where they have changed.
+    fn set_meshes(&mut self, gpu: &Gpu) -> Result<usize, ActionError> {
+        let Some(rows) = self.meshes.rows() else { return Ok(0) };
+        let set = self.mesh_rows.set(gpu, rows);
+        if set.is_err() {
+            self.meshes.forget();
+        }
+        set
     }
 
     /// What the application has drawn, where it has changed.
@@ -182,8 +201,9 @@ impl Drawing {
         let Some(target) = &self.target else { return Ok(()) };
         let volumes: Vec<_> = items.iter().flat_map(Item::volumes).filter_map(|v| self.volumes.get(v)).collect();
         let rows = [&self.frame, &self.numbers, &self.tables, &self.limits];
-        let Some(empties) = self.skipping.held() else { return Ok(()) };
+        let (Some(empties), Some(meshes)) = (self.skipping.held(), self.mesh_rows.buffer()) else { return Ok(()) };
         let mut made_of = vec![pipeline.generation, target.generation, self.skipping.generation];
+        made_of.push(self.mesh_rows.generation);
         made_of.extend(rows.iter().map(|r| r.generation).chain(volumes.iter().map(|v| v.generation)));
         if self.bound.as_ref().is_some_and(|b| b.made_of == made_of) {
             return Ok(());
@@ -196,8 +216,13 @@ impl Drawing {
                 ..Default::default()
             })
         });
-        let buffers =
-            rows.iter().filter_map(|r| r.buffer()).chain([&target.pixels, &target.depths, &target.flags, empties]);
+        let buffers = rows.iter().filter_map(|r| r.buffer()).chain([
+            &target.pixels,
+            &target.depths,
+            &target.flags,
+            empties,
+            meshes,
+        ]);
         let frame: Vec<_> = buffers.map(wgpu::Buffer::as_entire_binding).collect();
         let views = volumes.iter().map(|v| wgpu::BindingResource::TextureView(&v.view));
         let views: Vec<_> = std::iter::once(wgpu::BindingResource::Sampler(sampler)).chain(views).collect();

@@ -6,6 +6,7 @@
 //! | volume | a 3D texture of the whole data, one for all shapes that show it ([`resources`]) |
 //! | lookup table | rows of a storage buffer, control points at any places, found by buckets |
 //! | shader | the author's functions merged into one compute module ([`volact_shaders::gpu`], [`pipeline`]) |
+//! | mesh | rows of one storage buffer: the boundary's faces under a tree, cells where they carry numbers |
 //! | frame | a dispatch of one invocation a pixel, summed in f32 registers ([`draw`], [`readback`]) |
 //!
 //! Everything that a frame needs is kept and compared with what is there at `begin_draw`: voxels by
@@ -19,7 +20,8 @@
 //! lose digits. Interpolation has exact weights unless the option `filter` says `hardware`.
 //!
 //! # Known gaps
-//! Meshes, surfaces, attributes and pre-interpolated tables are refused by name.
+//! Volumes that meshes carry by texture coordinates, and pre-interpolated tables of shaders other than `lut`, are refused by
+//! name; so are, once they are seen, meshes whose cells carry numbers and overlap.
 
 mod action;
 mod check;

@@ -51,7 +51,7 @@ impl Pipelines {
 
 fn make(gpu: &Gpu, key: &Key, recipes: &[Recipe], generation: u64) -> Result<Pipeline, ActionError> {
     let wrong = |error: ComposeError| ActionError::Backend { action: NAME.into(), source: Box::new(error) };
-    let made = compose(recipes, key.spans, key.planes, gpu.cuts_loops()).map_err(wrong)?;
+    let made = compose(recipes, key.spans, (key.planes, key.surfaces), gpu.cuts_loops()).map_err(wrong)?;
     check(gpu, &made.layout)?;
     let device = &gpu.device;
     let module = shader_module(device, made.module);
@@ -108,7 +108,7 @@ fn check(gpu: &Gpu, layout: &Layout) -> Result<(), ActionError> {
 }
 
 /// Storage buffers of group 0.
-const BUFFERS: u32 = 6;
+const BUFFERS: u32 = 7;
 
 /// A binding of a compute stage.
 pub fn entry(binding: u32, ty: wgpu::BindingType) -> wgpu::BindGroupLayoutEntry {
@@ -129,6 +129,7 @@ fn frame_group(device: &wgpu::Device) -> wgpu::BindGroupLayout {
             entry(5, storage(false)),
             entry(6, storage(false)),
             entry(7, storage(true)),
+            entry(8, storage(true)),
         ],
     })
 }

@@ -6,7 +6,8 @@
 // is left of the light from behind, depth, a state, and the number of samples. The states: 0 nothing
 // yet, 1 some, 2 enough: the ray has ended, 3 shapes that are one picture each are being laid over.
 //
-// A shape that is one picture is one run, after all others.
+// A shape that is one picture is one run, after all others. Before those, where there are surfaces, comes a run
+// of no shape, which lays them behind what was gathered.
 //
 // Levels are counted along the axis from the anchor; slab k begins at k steps and a rest, which is what
 // the anchor lacks to a plane. A run's ends beyond which there is nothing of its shapes are open, so that
@@ -77,7 +78,7 @@ fn volact_run(corner: VolactCorner) {
     volact_dark();
     let known = volact_light[at + 1u];
     volact_members = vec2<u32>(corner.run.xy);
-    let flat_one = DEEP < SHAPES && volact_members.x >= DEEP;
+    let flat_one = DEEP < SHAPES && volact_members.x >= DEEP && volact_members.x < volact_members.y;
     if known.z == 2.0 && !flat_one { return; }
     if known.z != 0.0 {
         volact_color = volact_light[at];
@@ -91,8 +92,14 @@ fn volact_run(corner: VolactCorner) {
         limit = volact_limits[at + 1u].x;
         ray.end = min(ray.end, limit);
     }
+    let surface = volact_first_surface(ray);
+    ray.end = min(ray.end, surface.w);
     var state = 1.0;
-    if flat_one {
+    if volact_members.x == volact_members.y {
+        if volact_is_infinite(surface.w) { return; }
+        volact_samples += 1u;
+        volact_meet(vec4<f32>(surface.rgb, 1.0), surface.w);
+    } else if flat_one {
         if known.z != 3.0 && volact_frame.limited != 0u { volact_meet(volact_limits[at], limit); }
         let color = volact_flat(volact_members.x, ray);
         volact_color = color + (1.0 - color.a) * volact_color;

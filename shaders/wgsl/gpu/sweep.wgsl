@@ -4,6 +4,7 @@
 
 struct VolactTrack {
     spans: VolactSpans,
+    rest: VolactRest,
     span: u32,
     // The number of the next segment, of the one where the piece at hand begins, and that piece with
     // its medium.
@@ -25,13 +26,22 @@ var<private> volact_tracks: array<VolactTrack, TRACKS>;
 fn volact_kind(shape: u32) -> u32 { return volact_numbers[8u * shape + 4u].z; }
 
 fn volact_track(shape: u32, ray: VolactRay) {
-    let spans = volact_spans(shape, ray);
+    volact_fill(shape, ray, volact_whole());
+    volact_tracks[shape].end = -3.0e38;
+    if (volact_numbers[8u * shape + 4u].w & VOLACT_INSIDE) == 0u {
+        volact_tracks[shape].span = volact_tracks[shape].spans.count;
+        volact_tracks[shape].rest.more = false;
+    }
+    volact_forward(shape, ray);
+}
+
+// The stretches of a shape behind a place, as many as there is room for.
+fn volact_fill(shape: u32, ray: VolactRay, rest: VolactRest) {
+    let spans = volact_spans(shape, ray, rest);
     volact_tracks[shape].spans = spans;
+    volact_tracks[shape].rest = volact_rest;
     volact_tracks[shape].span = 0u;
     volact_tracks[shape].k = volact_first_segment(spans.ends[0].x);
-    volact_tracks[shape].end = -3.0e38;
-    if (volact_numbers[8u * shape + 4u].w & VOLACT_INSIDE) == 0u { volact_tracks[shape].span = spans.count; }
-    volact_forward(shape, ray);
 }
 
 // The next piece of a shape; at the end it begins at infinity.
@@ -39,7 +49,11 @@ fn volact_forward(shape: u32, ray: VolactRay) {
     volact_tracks[shape].crossing = volact_frame.infinity;
     loop {
         let span = volact_tracks[shape].span;
-        if span >= volact_tracks[shape].spans.count { break; }
+        if span >= volact_tracks[shape].spans.count {
+            if !MESHES || !volact_tracks[shape].rest.more { break; }
+            volact_fill(shape, ray, volact_tracks[shape].rest);
+            continue;
+        }
         let ends = volact_tracks[shape].spans.ends[span];
         let k = volact_tracks[shape].k;
         let t0 = max(volact_border(k), ends.x);
@@ -175,10 +189,7 @@ fn volact_slice(shape: u32, ray: VolactRay, row: u32) -> f32 {
     let slope = dot(plane.xyz, ray.direction);
     if slope == 0.0 { return -3.0e38; }
     let t = (plane.w - dot(plane.xyz, volact_floats(8u * shape).xyz + ray.start)) / slope;
-    for (var i = 0u; i < volact_tracks[shape].spans.count; i += 1u) {
-        let ends = volact_tracks[shape].spans.ends[i];
-        if t >= ends.x && t <= ends.y && volact_holds(t) { return t; }
-    }
+    if volact_holds(t) && volact_within(shape, ray, volact_tracks[shape].spans, t) { return t; }
     return -3.0e38;
 }
 
