@@ -96,7 +96,7 @@ fn volact_carry(shape: u32, p: vec3<f32>) {
 // Cells that overlap would count each, and here only one does: which is the picture's error, where they overlap
 // by more than parts that merely touch may, by rounding.
 fn volact_overlapping(shape: u32, begin: f32, end: f32, gap: f32) {
-    if (volact_numbers[8u * shape + 4u].w & VOLACT_CARRIES) != 0u && end - begin > 256.0 * gap {
+    if (volact_numbers[8u * shape + 4u].w & VOLACT_CARRIES) != 0u && end - begin > 1024.0 * gap {
         atomicMax(&volact_flags[194], shape + 1u);
     }
 }

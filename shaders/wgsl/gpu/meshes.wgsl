@@ -67,7 +67,7 @@ fn volact_line(shape: u32, ray: VolactRay, aside: u32) -> VolactLine {
     let most = 1.0 + max(max(abs(line.origin.x), abs(line.origin.y)), abs(line.origin.z));
     var ways = array<vec2<f32>, 4>(vec2<f32>(0.0), vec2<f32>(0.9, 0.6), vec2<f32>(-0.7, 1.1), vec2<f32>(0.4, -1.3));
     line.aside = 5.0e-7 * most * ways[aside % 4u];
-    line.gap = 2.0e-6 * most / size[k];
+    line.gap = 4.0e-7 * most / size[k];
     return line;
 }
 
