@@ -183,7 +183,8 @@ impl Drawing {
             let wanted = format!("at most {most} on adapter {:?}; draw fewer in a frame", gpu.name());
             return Err(limit("number of volumes".into(), images.to_string(), wanted));
         }
-        let composition = compose_slices(recipes, key.0.spans, (sweeps, key.0.surfaces), gpu.cuts_loops());
+        let has = (sweeps, key.0.planes, key.0.surfaces);
+        let composition = compose_slices(recipes, key.0.spans, has, gpu.cuts_loops());
         let composition = composition.map_err(|e| backend(Box::new(e)))?;
         let pipeline = Pipeline::new(gpu, &composition, &self.cache).map_err(|e| backend(Box::new(e)))?;
         let (pipeline, layout) = (Arc::new(pipeline), composition.layout);

@@ -94,17 +94,17 @@ pub fn compose(
 
 /// Composes the stages that draw slabs of shapes, in the order of [`compose`]: a vertex stage
 /// `volact_corner` and a fragment stage `volact_run`. `sweeps` tells that a run may have several shapes,
-/// surfaces of values or slice planes, `surfaces` that there are some; the rest as for [`compose`].
+/// surfaces of values or slice planes; the rest as for [`compose`].
 ///
 /// # Errors
 /// As [`compose`].
 pub fn compose_slices(
     recipes: &[Recipe],
     spans: u32,
-    (sweeps, surfaces): (bool, bool),
+    (sweeps, planes, surfaces): (bool, bool, bool),
     watched: bool,
 ) -> Result<Composition, ComposeError> {
-    stage(recipes, spans, (true, surfaces, watched), &format!("const ALONES: bool = {};\n", !sweeps), &SLICES)
+    stage(recipes, spans, (planes, surfaces, watched), &format!("const ALONES: bool = {};\n", !sweeps), &SLICES)
 }
 
 fn stage(
@@ -122,9 +122,11 @@ fn stage(
     let deep = kinds.iter().take_while(|c| is_deep(**c)).count();
     let alone = deep == 1 && kinds[0] == Compositing::Over && !planes;
     let meshes = recipes.iter().any(|r| r.mesh);
+    let crosses = kinds.contains(&Compositing::First);
     let constants = format!(
         "const SHAPES: u32 = {}u;\nconst DEEP: u32 = {deep}u;\nconst TRACKS: u32 = {}u;\nconst SPANS: u32 = {}u;\n\
-         const MESHES: bool = {meshes};\nconst ALONE: bool = {alone};\n{more}",
+         const MESHES: bool = {meshes};\nconst ALONE: bool = {alone};\nconst PLANES: bool = {planes};\n\
+         const CROSSES: bool = {crosses};\n{more}",
         recipes.len(),
         deep.max(1),
         spans + if meshes { STRETCHES } else { 0 },

@@ -3,7 +3,8 @@
 // Constants given before: SHAPES, how many; DEEP, how many of them are composited in depth: the first,
 // and TRACKS, that or 1;
 // SPANS, the stretches of a ray that there is room for; MESHES, whether a shape may be one; ALONE, whether
-// there is just one shape, which absorbs.
+// there is just one shape, which absorbs; PLANES and CROSSES, whether a shape may have slice planes, or crossings of
+// values: what there is not need not be compiled.
 //
 // Rows of shape i, from 8i: 0 the anchor in local space, unit distance; 1 to 3 local space to
 // the block as a unit cube, or to the box around a mesh as one from -1 to 1; 4 first row of its clip regions,

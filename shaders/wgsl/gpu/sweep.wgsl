@@ -93,7 +93,7 @@ fn volact_take(shape: u32, ray: VolactRay, t0: f32, t1: f32, enters: bool) {
     volact_tracks[shape].end = t1;
     volact_tracks[shape].medium = Medium(vec3<f32>(0.0), 0.0);
     volact_samples += 1u;
-    if volact_kind(shape) != VOLACT_FIRST {
+    if !CROSSES || volact_kind(shape) != VOLACT_FIRST {
         let m = volact_shade(shape, volact_sample(shape, ray, 0.5 * (t0 + t1), t1 - t0, 0.0));
         if volact_seen(m) { volact_tracks[shape].medium = m; }
         return;
@@ -175,7 +175,7 @@ fn volact_next_hit(ray: VolactRay, last: f32) -> f32 {
     for (var shape = volact_swept().x; shape < volact_swept().y; shape += 1u) {
         nearest = min(nearest, volact_tracks[shape].crossing);
         let planes = volact_numbers[8u * shape + 5u];
-        for (var n = 0u; n < planes.w; n += 1u) {
+        for (var n = 0u; PLANES && n < planes.w; n += 1u) {
             let t = volact_slice(shape, ray, planes.z + n);
             if t > last { nearest = min(nearest, t); }
         }
@@ -199,14 +199,14 @@ fn volact_hits(ray: VolactRay, t: f32) {
     var left = 1.0;
     for (var shape = volact_swept().x; shape < volact_swept().y; shape += 1u) {
         let planes = volact_numbers[8u * shape + 5u];
-        for (var n = 0u; n < planes.w; n += 1u) {
+        for (var n = 0u; PLANES && n < planes.w; n += 1u) {
             if volact_slice(shape, ray, planes.z + n) == t {
                 let color = volact_on_slice(shape, ray, t);
                 sum += color;
                 left *= 1.0 - color.a;
             }
         }
-        while volact_tracks[shape].crossing == t {
+        while CROSSES && volact_tracks[shape].crossing == t {
             let m = volact_shade(shape, volact_sample(shape, ray, t, volact_frame.step, volact_current(shape)));
             let color = volact_premultiplied(m);
             sum += color;
@@ -260,7 +260,7 @@ fn volact_sweep(ray: VolactRay) {
         var begin = volact_frame.infinity;
         for (var shape = volact_swept().x; shape < volact_swept().y; shape += 1u) { begin = min(begin, max(volact_tracks[shape].start, t)); }
         if hit <= begin {
-            if volact_is_infinite(hit) { return; }
+            if volact_is_infinite(hit) || !(PLANES || CROSSES) { return; }
             volact_hits(ray, hit);
             t = hit;
             hit = volact_next_hit(ray, t);
@@ -275,7 +275,7 @@ fn volact_sweep(ray: VolactRay) {
         if m.extinction > 0.0 { volact_through(m, begin, end); }
         t = end;
         // What lies at the very end of a piece comes before the next, with which it would be forgotten.
-        if hit <= t {
+        if (PLANES || CROSSES) && hit <= t {
             volact_hits(ray, t);
             hit = volact_next_hit(ray, t);
         }
@@ -290,6 +290,6 @@ fn volact_sweep(ray: VolactRay) {
                 surfaces = surfaces || volact_kind(shape) == VOLACT_FIRST;
             }
         }
-        if surfaces { hit = volact_next_hit(ray, t); }
+        if CROSSES && surfaces { hit = volact_next_hit(ray, t); }
     }
 }

@@ -72,11 +72,11 @@ fn a_ball() -> VolumeTexture {
 }
 
 fn view() -> FrameDesc {
-    square(DVec3::splat(4.0), DVec3::new(4.0, -9.0, 5.0), 14.0, 32)
+    square(DVec3::splat(4.0), DVec3::new(4.0, -9.0, 5.0), 14.0, 24)
 }
 
 fn near() -> FrameDesc {
-    FrameDesc::new(Camera::perspective(DVec3::new(9.0, -11.0, 7.0), DVec3::splat(4.0), DVec3::Z, 50.0), 32, 28)
+    FrameDesc::new(Camera::perspective(DVec3::new(9.0, -11.0, 7.0), DVec3::splat(4.0), DVec3::Z, 50.0), 24, 20)
 }
 
 fn a_tube() -> Own {
@@ -148,7 +148,7 @@ fn sheared_and_mirrored_meshes() {
 #[test]
 fn every_compositing() {
     for name in ["gradient", "mip", "minip", "average"] {
-        agree(name, &[of(a_tube(), name), of(bars(), name)], &near());
+        agree(name, &[of(bars(), name)], &near());
     }
     let texture = a_ball();
     let surfaces = colors(&[(30.0, [1.0, 0.4, 0.1], 0.4), (90.0, [0.3, 0.8, 0.2], 0.7)]);
