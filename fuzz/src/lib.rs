@@ -216,13 +216,20 @@ fn scene(data: &mut &[u8]) -> Option<(Shape, FrameDesc, Sampling)> {
         points.push(point);
     }
     let cells: Vec<u32> = (3..points.len() as u32).flat_map(|i| [i - 3, i - 2, i - 1, i]).collect();
-    let scalars = Attribute::new("t", ScalarType::F64, 3, Buffer::from_vec(points.clone())).ok()?;
+    let scalars = Attribute::new(
+        "t",
+        ScalarType::F64,
+        3,
+        Buffer::from_vec(points.iter().flat_map(|p| p.to_array()).collect::<Vec<f64>>()),
+    )
+    .ok()?;
     let mesh = Mesh::new(points.into(), CellTypes::All(CellType::Tetrahedron), Buffer::from_vec(cells)).ok()?;
     let appearance = Appearance::new("attribute").with("scalars", scalars).with("unit_distance", 1.0);
     let shape = Shape::new(mesh, appearance.with("lookup_table", LookupTable::grey([0.0, 1.0])));
     shape.set_clip(Clip::new([if setting & 64 == 0 { region } else { region.cut() }]));
     let modes = [SamplingMode::Auto, SamplingMode::AxisAligned, SamplingMode::SphericalShells, SamplingMode::Auto];
-    let spaces = [SamplingSpace::ViewVolume, SamplingSpace::Object, SamplingSpace::Primitive, SamplingSpace::ViewVolume];
+    let spaces =
+        [SamplingSpace::ViewVolume, SamplingSpace::Object, SamplingSpace::Primitive, SamplingSpace::ViewVolume];
     let sampling = Sampling {
         mode: modes[usize::from(setting & 3)],
         space: spaces[usize::from(setting >> 2 & 3)],

@@ -4,7 +4,7 @@ use naga::back::spv;
 use volact_core::{ParameterType, ShaderEntry};
 use volact_shaders::{
     Program, builtin,
-    gpu::{self, Recipe, VolumeUse, compose},
+    gpu::{self, Recipe, VolumeUse, compose, compose_slices},
     load,
     signatures::kind_of,
 };
@@ -24,8 +24,12 @@ fn shaped(entry: &ShaderEntry, volume: Option<VolumeUse>, mesh: bool) -> Recipe 
 
 /// Composes, validates and writes; gives the words of SPIR-V.
 fn words(recipes: &[Recipe], spans: u32, planes: bool) -> Vec<u32> {
-    compose(recipes, spans, (planes, spans > 2), true).unwrap_or_else(|error| panic!("watched: {error}"));
-    let made = compose(recipes, spans, (planes, spans > 2), false).unwrap_or_else(|error| panic!("{error}"));
+    let has = (planes, spans > 2);
+    compose(recipes, spans, has, true).unwrap_or_else(|error| panic!("watched: {error}"));
+    for skips in [false, true] {
+        compose_slices(recipes, spans, has, (true, skips), true).unwrap_or_else(|error| panic!("slabs: {error}"));
+    }
+    let made = compose(recipes, spans, has, false).unwrap_or_else(|error| panic!("{error}"));
     let options = spv::Options { lang_version: (1, 3), ..spv::Options::default() };
     spv::write_vec(&made.module, &made.info, &options, None).unwrap()
 }
@@ -142,7 +146,8 @@ fn tables_before_interpolation_are_a_valid_module() {
 
 #[test]
 fn passes_around_the_march_are_valid() {
-    for (module, info) in [gpu::skip::module().unwrap(), gpu::onto::limits().unwrap(), gpu::onto::onto().unwrap()] {
+    let onto = [gpu::onto::limits(), gpu::onto::onto()];
+    for (module, info) in [gpu::skip::module(), gpu::finish()].into_iter().chain(onto).map(Result::unwrap) {
         let options = spv::Options { lang_version: (1, 3), ..spv::Options::default() };
         assert!(!spv::write_vec(&module, &info, &options, None).unwrap().is_empty());
     }

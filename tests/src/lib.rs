@@ -30,3 +30,4 @@ pub mod subject;
 pub mod tables;
 pub mod tolerance;
 pub mod truth;
+pub mod voxels;

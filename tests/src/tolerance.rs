@@ -16,6 +16,8 @@
 //! - *tables*: linear interpolation between the nodes that the frame reports ([`tables`]);
 //! - *cells*: 1.5e-5 where numbers of meshes are `linear in each cell` of f32: the colour of a stretch
 //!   is taken as linear in optical depth up to there;
+//! - *format of voxels*: what moving voxels by half a step of a format changes that has fewer digits
+//!   than they have ([`voxels`](crate::voxels));
 //! - *ends*: the transmittance at which rays end, if they do;
 //! - *enclosure*: half the width of what the reference encloses, where rounding decides what is seen.
 //!

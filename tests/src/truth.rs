@@ -8,16 +8,25 @@ use std::{
 use volact_core::{FrameDesc, Registry, Shape, glam::DAffine3, glam::DVec3, resolve::ResolvedShape};
 use volact_cpu::reference::{ReferencePicture, integrate};
 
-use crate::method::Lattice;
+use crate::{method::Lattice, voxels::Noise};
 
-/// Pictures by case, label, lattice and shift.
+/// What is changed of a scene, to see what that does to its picture.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Change {
+    /// Shapes are moved by this, in the world.
+    pub shift: DVec3,
+    /// Voxels are moved by this.
+    pub noise: Option<Noise>,
+}
+
+/// Pictures by case, label, lattice and change.
 #[derive(Debug, Default)]
 pub struct Truths {
     kept: Mutex<HashMap<String, Arc<ReferencePicture>>>,
 }
 
 impl Truths {
-    /// The true picture of shapes, moved by `shift` in the world, under a key that no other scene has.
+    /// The true picture of shapes that are changed, under a key that no other scene has.
     ///
     /// # Errors
     /// If the reference does not draw them, in words.
@@ -27,13 +36,13 @@ impl Truths {
         registry: &Registry,
         (shapes, desc): (&[Shape], &FrameDesc),
         lattice: Lattice,
-        shift: DVec3,
+        change: &Change,
     ) -> Result<Arc<ReferencePicture>, String> {
-        let key = format!("{key} {lattice:?} {shift:?}");
+        let key = format!("{key} {lattice:?} {change:?}");
         if let Some(found) = self.lock().get(&key) {
             return Ok(Arc::clone(found));
         }
-        let picture = Arc::new(draw(registry, shapes, desc, lattice, shift)?);
+        let picture = Arc::new(draw(registry, shapes, desc, lattice, change)?);
         self.lock().insert(key, Arc::clone(&picture));
         Ok(picture)
     }
@@ -58,12 +67,15 @@ fn draw(
     shapes: &[Shape],
     desc: &FrameDesc,
     lattice: Lattice,
-    shift: DVec3,
+    change: &Change,
 ) -> Result<ReferencePicture, String> {
     let resolve = |shape: &Shape| {
         let mut resolved = ResolvedShape::new(shape, registry.shaders()).map_err(|e| chain(&e))?;
-        if shift != DVec3::ZERO {
-            resolved.state.transform = DAffine3::from_translation(shift) * resolved.state.transform;
+        if let Some(noise) = &change.noise {
+            noise.add(&mut resolved);
+        }
+        if change.shift != DVec3::ZERO {
+            resolved.state.transform = DAffine3::from_translation(change.shift) * resolved.state.transform;
             resolved.to_object = resolved.state.transform.inverse();
         }
         Ok(resolved)

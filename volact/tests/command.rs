@@ -99,6 +99,20 @@ fn bare_volume_just_works() {
     assert!((50..1000).contains(&lit), "{lit} pixels show the ball");
 }
 
+/// A shader that looks into the volume is not given a table that makes a black box of it.
+#[test]
+fn bare_volume_is_seen_with_a_shader_of_the_users_choice() {
+    let folder = folder();
+    for shader in ["gradient", "tangent_space", "mip"] {
+        let output = volact(folder.path(), &["render", "ball.nrrd", "--shader", shader, "--size", "32", "-o", "b.npy"]);
+        assert_eq!(code(&output), 0, "{}", err(&output));
+        let picture = volact_files::picture::load_picture(&folder.path().join("b.npy")).unwrap();
+        let [corner, middle] = [0, 16 * 32 + 16].map(|i| picture.rgba[i]);
+        assert!(middle[..3].iter().any(|c| *c > 0.2), "{shader}: {middle:?}");
+        assert!(corner[..3].iter().all(|c| *c < 0.02), "{shader}: {corner:?}");
+    }
+}
+
 #[test]
 fn scene_is_drawn_by_the_first_preferred_action_that_can() {
     let folder = folder();

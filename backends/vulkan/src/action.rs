@@ -143,7 +143,7 @@ impl VulkanAction {
         formats.sort();
         formats.dedup();
         Method {
-            sampling: "slabs along the view axis, midpoint lattice".into(),
+            sampling: "planes along the view axis, midpoint lattice".into(),
             sample_distance: made.step.distance,
             classification: "shader evaluated in the middle of segments".into(),
             table_width: 0,

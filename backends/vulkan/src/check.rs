@@ -1,6 +1,6 @@
 //! What `vulkan` draws, and the errors for what it does not.
 
-use volact_core::{ActionError, Caps, Compositing, resolve::ResolvedShape, slicing::SlicingError};
+use volact_core::{ActionError, Caps, Compositing, resolve::ResolvedShape};
 use volact_shaders::{
     Programs,
     gpu::{mesh::surface, scene},
@@ -17,14 +17,7 @@ pub fn caps(device: &str) -> Caps {
         shaders: Some(builtin.into_iter().map(|s| s.declaration.name).chain(["surface".into()]).collect()),
         sources: true,
         geometries: None,
-        compositing: vec![
-            Compositing::Over,
-            Compositing::Maximum,
-            Compositing::Minimum,
-            Compositing::Average,
-            Compositing::Add,
-            Compositing::First,
-        ],
+        compositing: Compositing::ALL.to_vec(),
         overlap: true,
         depth: true,
         device: device.into(),
@@ -51,15 +44,4 @@ pub fn check(shape: &ResolvedShape, programs: &Programs) -> Result<(), ActionErr
 /// The error of a limit that is passed.
 pub fn limit(what: String, found: String, wanted: String) -> ActionError {
     ActionError::Limit { action: NAME.into(), what, found, wanted }
-}
-
-/// Why a frame cannot be sliced, as an error of the action.
-pub fn sliced(error: SlicingError) -> ActionError {
-    match error {
-        SlicingError::Camera(error) => ActionError::Frame(error.into()),
-        SlicingError::TooMany { shape, found, wanted } => {
-            limit(format!("number of planes through shape {shape:?}"), found, format!("at most {wanted}"))
-        }
-        other => ActionError::Backend { action: NAME.into(), source: Box::new(other) },
-    }
 }

@@ -1,32 +1,28 @@
 //! One picture: what is drawn becomes rows of numbers, polygons and a submission.
 
-use std::{borrow::Cow, sync::Arc};
+use std::sync::Arc;
 
 use ash::vk;
 use volact_core::{
-    ActionError, Block, Compositing, FrameDesc, Geometry, ParameterValue, Viewport, Volume,
-    frame::Rebuild,
-    glam::DVec3,
-    resolve::ResolvedShape,
-    slicing::{Sampling, Slicing, Solid, Step},
+    ActionError, Compositing, FrameDesc, Viewport, Volume, frame::Rebuild, resolve::ResolvedShape, slicing::Step,
 };
 use volact_shaders::gpu::{
-    Layout, MOST_ROWS, Recipe, compose_slices, is_deep,
-    mesh::{Meshes, is_mesh},
+    Layout, MOST_ROWS, Recipe, compose_slices,
+    mesh::Meshes,
     pack::Row,
+    runs::{Corner, Polygon, Sliced, Upward, border, corners},
     scene::{self, Item, Key, Limited, Seen},
 };
 
 use crate::{
-    check::{self, NAME, limit},
+    check::{NAME, limit},
     device::{DeviceError, Gpu},
     memory::{Buffer, Place},
     options::Settings,
     pipeline::{Bound, Cache, Pipeline, Sampler},
     readback::Target,
     resources::{Rows, Volumes},
-    runs::{Corner, corners, in_groups},
-    stream::{Polygon, Stream},
+    stream::Stream,
 };
 
 /// Pipelines that are kept.
@@ -107,29 +103,21 @@ impl Drawing {
         &mut self,
         gpu: &Arc<Gpu>,
         desc: &FrameDesc,
-        (mut items, surfaces): (Vec<Item<'_>>, &[&ResolvedShape]),
+        (items, surfaces): (Vec<Item<'_>>, &[&ResolvedShape]),
         settings: &Settings,
         rebuilt: &mut Vec<Rebuild>,
     ) -> Result<Drawn, ActionError> {
-        // Those composited in depth come first, in an order that does not depend on that of drawing.
-        items.sort_by_key(|i| if is_deep(i.program.compositing()) { (0, i.shape.id) } else { (1, 0) });
-        let mut solids = solids(&mut items, &self.meshes)?;
-        let deep = items.iter().filter(|i| is_deep(i.program.compositing())).count();
-        let mut slicing = plan(&solids, desc, &settings.sampling)?;
-        let (order, groups) = in_groups(&slicing, deep);
-        if !order.is_sorted() {
-            items = in_order(items, &order);
-            solids = in_order(solids, &order);
-            slicing = plan(&solids, desc, &settings.sampling)?;
-        }
+        let sliced = Sliced::new(NAME, (items, &self.meshes), desc, &settings.sampling)?;
+        let (items, slicing) = (&sliced.items[..], sliced.slicing(NAME, desc, &settings.sampling)?);
+        let groups = sliced.groups(&slicing);
         let step = *slicing.step();
         // Without shapes there is no step, and nothing that needs one.
         let distance = if step.distance > 0.0 { step.distance } else { 1.0 };
-        let seen = Seen::new(desc, (&items, surfaces), distance)?;
+        let seen = Seen::new(desc, (items, surfaces), distance)?;
         let held = |volume: &Volume| self.volumes.held(volume);
         let recipes: Vec<Recipe> = items.iter().map(|i| i.recipe(settings.hardware, held)).collect();
         let sweeps = groups.iter().any(|g| g[1] - g[0] > 1);
-        let all = (&items[..], &recipes[..], surfaces);
+        let all = (items, &recipes[..], surfaces);
         let (pipeline, layout) = self.pipeline(gpu, all, sweeps, desc, rebuilt)?;
         let mut uploaded = self.set_meshes(gpu)?;
         let held = |volume: &Volume| self.volumes.held(volume);
@@ -138,11 +126,11 @@ impl Drawing {
         uploaded += self.numbers.set(gpu, numbers)? + self.tables.set(gpu, tables)?;
         uploaded += self.set_limits(gpu, seen.limited(desc))?;
         uploaded += self.frame.set(gpu, seen.rows(desc, settings.termination, desc.opaque.is_some(), numbered))?;
-        let (base, rest) = border(&seen, distance);
-        let (vertices, polygons) = corners(&slicing, &groups, (base, rest), !surfaces.is_empty());
+        let border = border(&seen, distance);
+        let (vertices, polygons) = corners(&slicing, &groups, border, !surfaces.is_empty(), Upward::No);
         uploaded += self.set_vertices(gpu, &vertices)?;
         self.make_target(gpu, &seen.viewport)?;
-        self.bind(&items, &pipeline)?;
+        self.bind(items, &pipeline)?;
         self.submit(&pipeline, &seen.viewport, &polygons)?;
         let order = items.iter().map(|i| i.shape.name.clone()).collect();
         Ok(Drawn { shift: seen.shift(), uploaded, order, step, runs: polygons.len() })
@@ -183,8 +171,8 @@ impl Drawing {
             let wanted = format!("at most {most} on adapter {:?}; draw fewer in a frame", gpu.name());
             return Err(limit("number of volumes".into(), images.to_string(), wanted));
         }
-        let has = (sweeps, key.0.planes, key.0.surfaces);
-        let composition = compose_slices(recipes, key.0.spans, has, gpu.cuts_loops());
+        let has = (key.0.planes, key.0.surfaces);
+        let composition = compose_slices(recipes, key.0.spans, has, (sweeps, false), gpu.cuts_loops());
         let composition = composition.map_err(|e| backend(Box::new(e)))?;
         let pipeline = Pipeline::new(gpu, &composition, &self.cache).map_err(|e| backend(Box::new(e)))?;
         let (pipeline, layout) = (Arc::new(pipeline), composition.layout);
@@ -282,51 +270,4 @@ impl Drawing {
         })?;
         self.stream.wait()
     }
-}
-
-/// Things in another order.
-fn in_order<T>(things: Vec<T>, order: &[usize]) -> Vec<T> {
-    let mut things: Vec<Option<T>> = things.into_iter().map(Some).collect();
-    order.iter().filter_map(|i| things[*i].take()).collect()
-}
-
-/// A shape for its slabs: of a mesh the box around it, in which fragments find the mesh themselves.
-/// `None` where it has no extent.
-fn boxed<'a>(shape: &'a ResolvedShape, meshes: &Meshes) -> Option<Cow<'a, ResolvedShape>> {
-    if !is_mesh(shape) {
-        return Some(Cow::Borrowed(shape));
-    }
-    let bounds = meshes.bounds(shape)?;
-    let block: Arc<dyn Geometry> = Arc::new(Block::new(bounds.min, bounds.size()).ok()?);
-    let mut made = shape.clone();
-    made.state.geometry = block;
-    made.parameters.retain(|_, value| !matches!(value, ParameterValue::Attribute(_)));
-    Some(Cow::Owned(made))
-}
-
-/// What is sliced; items of which nothing is there are left out.
-fn solids(items: &mut Vec<Item<'_>>, meshes: &Meshes) -> Result<Vec<Solid>, ActionError> {
-    let mut made = Vec::with_capacity(items.len());
-    let mut kept = Vec::with_capacity(items.len());
-    for item in items.drain(..) {
-        let Some(shape) = boxed(item.shape, meshes) else { continue };
-        if let Some(solid) = Solid::new(&shape, None)? {
-            made.push(solid);
-            kept.push(item);
-        }
-    }
-    *items = kept;
-    Ok(made)
-}
-
-fn plan<'a>(solids: &'a [Solid], desc: &FrameDesc, sampling: &Sampling) -> Result<Slicing<'a>, ActionError> {
-    Slicing::new(solids.iter().collect(), desc, sampling).map_err(check::sliced)
-}
-
-/// The slab from which slabs are counted on the device, and its level seen from the anchor.
-fn border(seen: &Seen, step: f64) -> (i64, f64) {
-    let linear = seen.grid.linear();
-    let level = linear.axis.dot(seen.anchor.point - linear.eye.unwrap_or(DVec3::ZERO));
-    let base = 32.0 * (level / (32.0 * step)).round();
-    (base as i64, base * step - level)
 }

@@ -20,7 +20,8 @@
 //!
 //! # Known gaps
 //! Refused by name, see [`check`]: volumes that meshes carry by texture coordinates, pre-interpolated tables of shaders other
-//! than `lut`, and what is no number in a volume; and, once they are seen, meshes whose cells carry numbers and overlap.
+//! than `lut`, and what is no number in a volume where the format has nothing for it; and, once they are seen, meshes whose
+//! cells carry numbers and overlap.
 //!
 //! # Unsafe code
 //! Calls of Vulkan are unsafe. They are in `device` (instance, adapter, device), `memory` (buffers and
@@ -38,7 +39,6 @@ pub mod options;
 mod pipeline;
 mod readback;
 mod resources;
-mod runs;
 #[expect(unsafe_code, reason = "Vulkan is called")]
 mod stream;
 

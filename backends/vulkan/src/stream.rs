@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use ash::vk;
+use volact_shaders::gpu::runs::Polygon;
 
 use crate::{
     device::{DeviceError, Gpu, Queue},
@@ -37,13 +38,6 @@ pub struct Point {
 pub struct Recorder<'a> {
     gpu: &'a Gpu,
     commands: vk::CommandBuffer,
-}
-
-/// A polygon of a run: vertices of the vertex buffer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Polygon {
-    pub first: u32,
-    pub count: u32,
 }
 
 /// Who wrote, and who reads: stages with their accesses.
@@ -149,8 +143,11 @@ impl Drop for Stream {
         if self.wait().is_err() {
             log::warn!("vulkan: {} did not finish", self.gpu.name());
         }
-        // SAFETY: nothing is in flight any more; both are the device's or null.
+        // SAFETY: nothing is in flight any more; both are the device's or null. Mesa's threads (22.3) still
+        // touch a timeline just after they have signalled it, so that waiting for it is not enough: what is
+        // handed to the queue after that comes after they are done with it.
         unsafe {
+            _ = self.gpu.device.queue_wait_idle(self.queue.raw);
             self.gpu.device.destroy_semaphore(self.semaphore, None);
             self.gpu.device.destroy_command_pool(self.pool, None);
         }

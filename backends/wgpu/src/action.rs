@@ -121,10 +121,9 @@ impl WgpuAction {
         };
         let drawn: Vec<&ResolvedShape> = open.drawn_shapes().collect();
         let (surfaces, solid): (Vec<_>, Vec<_>) = drawn.iter().copied().partition(|s| is_surface(s));
-        let step = plan::step(&solid, &self.settings)?;
         let item = |shape| Ok(Item { shape, program: self.programs.of(shape)? });
         let items = solid.into_iter().map(item).collect::<Result<Vec<_>, ActionError>>()?;
-        let how = (step, &self.settings, onto);
+        let how = (&self.settings, onto);
         let submitted = self.drawing.submit(&self.gpu, &open.desc, (items, &surfaces), how, &mut rebuilt)?;
         uploaded += submitted.uploaded;
         let prepare = at.elapsed();
@@ -143,7 +142,7 @@ impl WgpuAction {
             return Err(overlapping(NAME, submitted.order.get(number)));
         }
         if counts.cut {
-            return Err(cut_short(NAME, self.gpu.name(), step));
+            return Err(cut_short(NAME, self.gpu.name(), submitted.step));
         }
         frame.warnings = drawn.iter().flat_map(|s| s.warnings.clone()).collect();
         if counts.rays == 0 && !drawn.is_empty() {
@@ -152,7 +151,7 @@ impl WgpuAction {
         }
         frame.warnings.extend(method::adjusted(&drawn, &self.drawing.volumes, &self.settings));
         self.emit(&frame);
-        frame.method = method::method(&drawn, &self.drawing.volumes, step, &self.settings, &self.gpu);
+        frame.method = method::method(&drawn, &self.drawing.volumes, &submitted, &self.settings, &self.gpu);
         let stats = &mut frame.statistics;
         (stats.rays, stats.samples, stats.skipped) = (counts.rays, counts.samples, counts.skipped);
         (stats.prepare, stats.total) = (prepare, at.elapsed());
@@ -161,6 +160,13 @@ impl WgpuAction {
         (stats.uploaded_bytes, stats.rebuilt, stats.threads) = (uploaded, rebuilt, 1);
         let megabytes = format!("{:.3} MB", self.drawing.volumes.bytes() as f64 * 1e-6);
         stats.details.push(("textures".into(), megabytes));
+        if let Some((planes, runs)) = submitted.planes {
+            stats.details.push(("planes".into(), planes.planes.to_string()));
+            stats.details.push(("runs of planes".into(), runs.to_string()));
+        }
+        if submitted.bands > 1 {
+            stats.details.push(("submissions".into(), submitted.bands.to_string()));
+        }
         if let Some(seconds) = counts.seconds {
             stats.details.push(("GPU time".into(), format!("{:.3} ms", seconds * 1e3)));
         }

@@ -73,6 +73,7 @@ pub struct Gpu {
     failed: Arc<Mutex<Option<DeviceError>>>,
     /// Whether it is an application's.
     shared: bool,
+    stores: Option<bool>,
 }
 
 /// Features that are used where they are there.
@@ -98,7 +99,9 @@ impl Gpu {
         let made = pollster::block_on(adapter.request_device(&descriptor));
         let (device, queue) =
             made.map_err(|error| DeviceError::NoDevice { adapter: info.name.clone(), why: error.to_string() })?;
-        Ok(Self::new(device, queue))
+        let flags = adapter.get_downlevel_capabilities().flags;
+        let stores = Some(flags.contains(wgpu::DownlevelFlags::FRAGMENT_WRITABLE_STORAGE));
+        Ok(Self { stores, ..Self::new(device, queue) })
     }
 
     fn new(device: wgpu::Device, queue: wgpu::Queue) -> Self {
@@ -126,7 +129,7 @@ impl Gpu {
         let (limits, features) = (device.limits(), device.features());
         log::info!("wgpu: {description}");
         let failed = Arc::new(Mutex::new(None));
-        Self { device, queue, limits, features, name, description, failed, shared: true }
+        Self { device, queue, limits, features, name, description, failed, shared: true, stores: None }
     }
 
     /// Catches errors of an application's device until they are closed.
@@ -160,6 +163,11 @@ impl Gpu {
     /// See [`cuts_loops`].
     pub fn cuts_loops(&self) -> bool {
         cuts_loops(&self.name)
+    }
+
+    /// Whether fragment stages may write to buffers; `None` where an application's device does not say.
+    pub fn stores_from_fragments(&self) -> Option<bool> {
+        self.stores
     }
 
     /// Whether it has a feature.

@@ -1,10 +1,10 @@
-//! One picture: what is drawn becomes rows of numbers, bindings and a dispatch.
+//! One picture: what is drawn becomes rows of numbers, bindings and submissions, one for each band of rows.
 
 use std::sync::Arc;
 
-use volact_core::{ActionError, FrameDesc, Viewport, Volume, frame::Rebuild, resolve::ResolvedShape};
+use volact_core::{ActionError, FrameDesc, Viewport, Volume, frame::Rebuild, resolve::ResolvedShape, slicing::Step};
 use volact_shaders::gpu::{
-    Anchor, FrameNumbers, MOST_ROWS, Recipe, WORKGROUP, is_deep,
+    Anchor, FrameNumbers, MOST_ROWS, Recipe, WORKGROUP,
     mesh::Meshes,
     pack::Row,
     scene::{self, Item, Key, Limited, Seen},
@@ -12,14 +12,17 @@ use volact_shaders::gpu::{
 };
 
 use crate::{
+    bands::{self, Band, Bounds, bands},
     check::NAME,
     device::Gpu,
     onto::{Laying, Onto},
     options::Settings,
-    pipeline::{Pipeline, Pipelines},
+    pipeline::{Pipeline, Pipelines, Stages},
+    plan::{self, Planned},
     readback::Target,
     resources::{Rows, Volumes, too_large},
     skip::Skipping,
+    slabs::{Groups, Slabs},
 };
 
 /// What draws, and what it keeps.
@@ -38,6 +41,7 @@ pub struct Drawing {
     limited: Option<Limited>,
     skipping: Skipping,
     laying: Laying,
+    slabs: Slabs,
     target: Option<Target>,
     targets: u64,
     sampler: Option<wgpu::Sampler>,
@@ -49,6 +53,8 @@ pub struct Drawing {
 struct Bound {
     made_of: Vec<u64>,
     groups: [wgpu::BindGroup; 2],
+    /// For what finishes slabs.
+    finish: Option<[wgpu::BindGroup; 2]>,
 }
 
 /// A picture on its way.
@@ -60,6 +66,12 @@ pub struct Drawn {
     pub uploaded: usize,
     /// Shapes in the order of the module.
     pub order: Vec<String>,
+    /// World distance between samples.
+    pub step: f64,
+    /// Planes, and draws of them, where it is made of slices.
+    pub planes: Option<(Step, usize)>,
+    /// Submissions that it is made by.
+    pub bands: usize,
 }
 
 impl Default for Drawing {
@@ -76,6 +88,7 @@ impl Default for Drawing {
             limited: None,
             skipping: Skipping::default(),
             laying: Laying::default(),
+            slabs: Slabs::default(),
             target: None,
             targets: 0,
             sampler: None,
@@ -93,17 +106,17 @@ impl Drawing {
         &mut self,
         gpu: &Gpu,
         desc: &FrameDesc,
-        (mut items, surfaces): (Vec<Item<'_>>, &[&ResolvedShape]),
-        (step, settings, onto): (f64, &Settings, Option<&Onto<'_>>),
+        (items, surfaces): (Vec<Item<'_>>, &[&ResolvedShape]),
+        (settings, onto): (&Settings, Option<&Onto<'_>>),
         rebuilt: &mut Vec<Rebuild>,
     ) -> Result<Drawn, ActionError> {
-        // Those composited in depth come first, in an order that does not depend on that of drawing.
-        items.sort_by_key(|i| if is_deep(i.program.compositing()) { (0, i.shape.id) } else { (1, 0) });
-        let seen = Seen::new(desc, (&items, surfaces), step)?;
         let mut uploaded = self.set_meshes(gpu)?;
+        let planned = Planned::new(desc, (items, &self.meshes), settings)?;
+        let (items, lattice) = (planned.items(), planned.lattice(desc, settings)?);
+        let seen = Seen::new(desc, (items, surfaces), lattice.step)?;
         let held = |volume: &Volume| self.volumes.held(volume);
         let recipes: Vec<Recipe> = items.iter().map(|i| i.recipe(settings.hardware, held)).collect();
-        let key = Key::new(NAME, (&items, surfaces), &recipes, &desc.clip)?;
+        let key = (Key::new(NAME, (items, surfaces), &recipes, &desc.clip)?, lattice.stage(items));
         let (pipeline, anew) = self.pipelines.get(gpu, key, &recipes)?;
         if anew {
             rebuilt.push(Rebuild { shape: NAME.into(), what: "pipeline".into(), bytes: 0 });
@@ -111,23 +124,31 @@ impl Drawing {
         let pairs: Vec<_> = items.iter().map(|i| (i.shape, &i.program)).collect();
         let cells = if settings.skipping { self.skipping.cells(&pairs) } else { vec![None; items.len()] };
         let how = (&pipeline.layout, &seen.anchor);
-        let all = (&items[..], &recipes[..], surfaces);
-        let (numbers, tables, surfaces) = scene::rows(all, how, &desc.clip, (&cells, &self.meshes), held);
+        let all = (items, &recipes[..], surfaces);
+        let (numbers, tables, numbered) = scene::rows(all, how, &desc.clip, (&cells, &self.meshes), held);
         uploaded += self.numbers.set(gpu, numbers)? + self.tables.set(gpu, tables)?;
         let depth = onto.and_then(|onto| onto.depth);
         match depth {
             Some(_) => self.reserve_limits(gpu, &seen.viewport)?,
             None => uploaded += self.upload_limits(gpu, seen.limited(desc))?,
         }
-        let limited = desc.opaque.is_some() || depth.is_some();
-        uploaded += self.frame.set(gpu, seen.rows(desc, settings.termination, limited, surfaces))?;
-        self.make_target(gpu, &seen.viewport)?;
+        let rows = seen.rows(desc, settings.termination, desc.opaque.is_some() || depth.is_some(), numbered);
+        uploaded += self.frame.set(gpu, rows.clone())?;
+        let bounds = Bounds { samples: settings.submission, pixels: usize::MAX };
+        let height = bands::height(&seen.viewport, plan::samples(items, lattice.step), &bounds);
+        self.make_target(gpu, &seen.viewport, height)?;
+        if let Some((corners, polygons)) = lattice.corners(&seen, !surfaces.is_empty()) {
+            uploaded += self.slabs.set(gpu, corners, polygons)?;
+            self.slabs.reserve(gpu, height * seen.viewport.width, &seen.viewport)?;
+        }
         self.skipping.buffer(gpu, &cells)?;
-        self.find_empty(gpu, &items, &cells, &pipeline, rebuilt)?;
-        self.bind(gpu, &items, &pipeline)?;
-        self.dispatch(gpu, &pipeline, (&seen.anchor, &seen.viewport), onto)?;
+        self.find_empty(gpu, items, &cells, &pipeline, rebuilt)?;
+        self.bind(gpu, items, &pipeline)?;
+        let bands: Vec<Band> = bands(&seen.viewport, height).collect();
+        uploaded += self.draw_bands(gpu, &pipeline, (&seen.anchor, &seen.viewport), (rows, &bands), onto)?;
         let order = items.iter().map(|i| i.shape.name.clone()).collect();
-        Ok(Drawn { shift: seen.shift(), uploaded, order })
+        let planes = lattice.planes.map(|step| (step, self.slabs.runs()));
+        Ok(Drawn { shift: seen.shift(), uploaded, order, step: lattice.step, planes, bands: bands.len() })
     }
 
     /// Where the picture is read from, once one was submitted.
@@ -137,8 +158,8 @@ impl Drawing {
 
     /// Bytes on the device besides volumes and pictures.
     pub fn bytes(&self) -> usize {
-        let rows = [&self.frame, &self.numbers, &self.tables, &self.mesh_rows, &self.limits];
-        rows.map(Rows::bytes).iter().sum::<usize>() + self.skipping.bytes()
+        let rows = [&self.frame, &self.numbers, &self.tables, &self.mesh_rows, &self.limits].map(Rows::bytes);
+        rows.iter().sum::<usize>() + self.skipping.bytes() + self.slabs.bytes()
     }
 
     fn find_empty(
@@ -182,15 +203,16 @@ impl Drawing {
         self.limits.reserve(gpu, 2 * viewport.width * viewport.height)
     }
 
-    fn make_target(&mut self, gpu: &Gpu, viewport: &Viewport) -> Result<(), ActionError> {
-        let count = viewport.width * viewport.height;
-        if 16 * count as u64 > gpu.limits.max_storage_buffer_binding_size {
-            return Err(too_large("the picture", 16 * count as u64, gpu.limits.max_storage_buffer_binding_size));
+    fn make_target(&mut self, gpu: &Gpu, viewport: &Viewport, height: usize) -> Result<(), ActionError> {
+        let (room, count) = (viewport.width * height, viewport.width * viewport.height);
+        let (wanted, most) = (16 * room as u64, gpu.limits.max_storage_buffer_binding_size);
+        if wanted > most {
+            return Err(too_large("the picture", wanted, most));
         }
-        if self.target.as_ref().is_none_or(|t| t.room() < count) {
+        if self.target.as_ref().is_none_or(|t| !t.holds(room, count)) {
             self.target = None;
             self.targets += 1;
-            self.target = Some(Target::new(gpu, count, self.targets));
+            self.target = Some(Target::new(gpu, (room, count), self.targets));
             gpu.check()?;
         }
         Ok(())
@@ -202,7 +224,8 @@ impl Drawing {
         let volumes: Vec<_> = items.iter().flat_map(Item::volumes).filter_map(|v| self.volumes.get(v)).collect();
         let rows = [&self.frame, &self.numbers, &self.tables, &self.limits];
         let (Some(empties), Some(meshes)) = (self.skipping.held(), self.mesh_rows.buffer()) else { return Ok(()) };
-        let mut made_of = vec![pipeline.generation, target.generation, self.skipping.generation];
+        let generations = [pipeline.generation, target.generation, self.skipping.generation, self.slabs.generation];
+        let mut made_of = generations.to_vec();
         made_of.push(self.mesh_rows.generation);
         made_of.extend(rows.iter().map(|r| r.generation).chain(volumes.iter().map(|v| v.generation)));
         if self.bound.as_ref().is_some_and(|b| b.made_of == made_of) {
@@ -216,55 +239,90 @@ impl Drawing {
                 ..Default::default()
             })
         });
-        let buffers = rows.iter().filter_map(|r| r.buffer()).chain([
-            &target.pixels,
-            &target.depths,
-            &target.flags,
-            empties,
-            meshes,
-        ]);
-        let frame: Vec<_> = buffers.map(wgpu::Buffer::as_entire_binding).collect();
+        let frame = |picture| {
+            let buffers = rows.iter().filter_map(|r| r.buffer());
+            let buffers = buffers.chain([picture, &target.depths, &target.flags, empties, meshes]);
+            buffers.map(wgpu::Buffer::as_entire_binding).collect::<Vec<_>>()
+        };
+        let slabs = matches!(pipeline.stages, Stages::Slabs(_));
+        let picture = self.slabs.light().filter(|_| slabs).unwrap_or(&target.pixels);
         let views = volumes.iter().map(|v| wgpu::BindingResource::TextureView(&v.view));
         let views: Vec<_> = std::iter::once(wgpu::BindingResource::Sampler(sampler)).chain(views).collect();
-        let groups = [group(gpu, &pipeline.groups[0], frame), group(gpu, &pipeline.groups[1], views)];
+        let groups = [group(gpu, &pipeline.groups[0], frame(picture)), group(gpu, &pipeline.groups[1], views)];
+        let finish = if slabs { self.slabs.bind(gpu, frame(&target.pixels)) } else { None };
         gpu.check()?;
-        self.bound = Some(Bound { made_of, groups });
+        self.bound = Some(Bound { made_of, groups, finish });
         Ok(())
     }
 
-    fn dispatch(
+    /// Draws band after band, and has it copied or laid; gives the bytes that were moved.
+    fn draw_bands(
         &mut self,
         gpu: &Gpu,
         pipeline: &Pipeline,
         (anchor, viewport): (&Anchor, &Viewport),
+        (mut rows, bands): (Vec<Row>, &[Band]),
         onto: Option<&Onto<'_>>,
-    ) -> Result<(), ActionError> {
-        let (Some(target), Some(bound)) = (&self.target, &self.bound) else { return Ok(()) };
-        let (Some(frame), Some(limits)) = (self.frame.buffer(), self.limits.buffer()) else { return Ok(()) };
-        let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: None });
-        encoder.clear_buffer(&target.flags, 0, None);
-        if let Some(depth) = onto.and_then(|onto| onto.depth) {
-            self.laying.limit(gpu, &mut encoder, (frame, limits), &depth, (anchor, viewport))?;
-        }
-        {
-            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
-                label: Some("volact rays"),
-                timestamp_writes: target.timestamps(),
-            });
-            pass.set_pipeline(&pipeline.pipeline);
-            bound.groups.iter().zip(0..).for_each(|(group, i)| pass.set_bind_group(i, group, &[]));
-            let groups = |n: usize| (n as u32).div_ceil(WORKGROUP);
-            pass.dispatch_workgroups(groups(viewport.width), groups(viewport.height), 1);
-        }
-        match onto {
-            Some(onto) => {
-                self.laying.lay(gpu, &mut encoder, (frame, &target.pixels), onto, viewport)?;
-                target.copy(&mut encoder, 0);
+    ) -> Result<usize, ActionError> {
+        let mut uploaded = 0;
+        for (number, band) in bands.iter().enumerate() {
+            let (first, last) = (number == 0, number + 1 == bands.len());
+            if !first && let [numbers, ..] = bytemuck::cast_slice_mut::<Row, FrameNumbers>(&mut rows) {
+                numbers.first_row = band.first as u32;
+                uploaded += self.frame.set(gpu, rows.clone())?;
             }
-            None => target.copy(&mut encoder, viewport.width * viewport.height),
+            let (Some(frame), Some(limits)) = (self.frame.buffer(), self.limits.buffer()) else { break };
+            let Some(target) = &self.target else { break };
+            let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: None });
+            if first {
+                encoder.clear_buffer(&target.flags, 0, None);
+            }
+            if let Some(depth) = onto.and_then(|onto| onto.depth).filter(|_| first) {
+                self.laying.limit(gpu, &mut encoder, (frame, limits), &depth, (anchor, viewport))?;
+            }
+            self.encode(&mut encoder, pipeline, (viewport, *band), (first, last));
+            match onto {
+                Some(onto) => {
+                    self.laying.lay(gpu, &mut encoder, (frame, &target.pixels), onto, (viewport, *band))?;
+                }
+                None => target.copy_band(&mut encoder, viewport, *band),
+            }
+            if last {
+                let count = if onto.is_some() { 0 } else { viewport.width * viewport.height };
+                target.copy_counts(&mut encoder, count);
+            }
+            gpu.queue.submit([encoder.finish()]);
+            gpu.check()?;
         }
-        gpu.queue.submit([encoder.finish()]);
-        Ok(gpu.check()?)
+        Ok(uploaded)
+    }
+
+    fn encode(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        pipeline: &Pipeline,
+        (viewport, band): (&Viewport, Band),
+        (first, last): (bool, bool),
+    ) {
+        let (Some(target), Some(bound)) = (&self.target, &self.bound) else { return };
+        let times = target.times(first, last);
+        match (&pipeline.stages, &bound.finish) {
+            (Stages::Slabs(pipeline), Some(finish)) => {
+                let groups = Groups { runs: &bound.groups, finish };
+                self.slabs.encode(encoder, pipeline, groups, (viewport, band), times);
+            }
+            (Stages::Slabs(_), None) => {}
+            (Stages::Rays(pipeline), _) => {
+                let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+                    label: Some("volact rays"),
+                    timestamp_writes: times.compute(true, true),
+                });
+                pass.set_pipeline(pipeline);
+                bound.groups.iter().zip(0..).for_each(|(group, i)| pass.set_bind_group(i, group, &[]));
+                let groups = |n: usize| (n as u32).div_ceil(WORKGROUP);
+                pass.dispatch_workgroups(groups(viewport.width), groups(band.rows), 1);
+            }
+        }
     }
 }
 

@@ -4,12 +4,13 @@ use volact_core::{Compositing, Method, ParameterValue, Warning, WarningCode, res
 
 use crate::{
     device::Gpu,
+    draw::Drawn,
     options::Settings,
     resources::{Held, Volumes},
 };
 
 /// How the shapes drawn were made into a picture.
-pub fn method(drawn: &[&ResolvedShape], volumes: &Volumes, step: f64, settings: &Settings, gpu: &Gpu) -> Method {
+pub fn method(drawn: &[&ResolvedShape], volumes: &Volumes, made: &Drawn, settings: &Settings, gpu: &Gpu) -> Method {
     let held: Vec<&Held> = all(drawn, volumes).map(|(_, held)| held).collect();
     let mut formats: Vec<_> = held.iter().map(|h| h.encoding.name()).collect();
     formats.sort();
@@ -24,8 +25,11 @@ pub fn method(drawn: &[&ResolvedShape], volumes: &Volumes, step: f64, settings: 
     }
     let hardware = settings.hardware && held.iter().any(|h| h.filterable);
     Method {
-        sampling: "ray casting, midpoint lattice".into(),
-        sample_distance: step,
+        sampling: match made.planes {
+            None => "ray casting, midpoint lattice".into(),
+            Some(_) => "slabs along the view axis, midpoint lattice".into(),
+        },
+        sample_distance: made.step,
         classification: classification.join(", "),
         table_width: 0,
         texture_format: formats.join(", "),

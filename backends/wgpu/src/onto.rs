@@ -9,7 +9,7 @@ use volact_shaders::gpu::{
     onto::{DepthNumbers, limits, onto},
 };
 
-use crate::{check::NAME, device::Gpu, draw::group, pipeline::entry};
+use crate::{bands::Band, check::NAME, device::Gpu, draw::group, pipeline::entry};
 
 /// What an application draws into.
 #[derive(Clone, Copy, Debug)]
@@ -88,7 +88,7 @@ impl Laying {
         Ok(gpu.check()?)
     }
 
-    /// Lays pixels over a viewport of a target.
+    /// Lays a band of pixels over a viewport of a target.
     ///
     /// # Errors
     /// If the device cannot blend the target's format, or fails.
@@ -98,7 +98,7 @@ impl Laying {
         encoder: &mut wgpu::CommandEncoder,
         (frame, pixels): (&wgpu::Buffer, &wgpu::Buffer),
         target: &Onto<'_>,
-        viewport: &Viewport,
+        (viewport, band): (&Viewport, Band),
     ) -> Result<(), ActionError> {
         let [_, uniform] = self.numbers.get_or_insert_with(|| make_numbers(gpu));
         gpu.queue.write_buffer(uniform, 0, bytemuck::bytes_of(&[viewport.x as u32, viewport.y as u32, 0, 0]));
@@ -123,6 +123,8 @@ impl Laying {
         pass.set_pipeline(pipeline);
         let [x, y, w, h] = [viewport.x, viewport.y, viewport.width, viewport.height].map(|v| v as f32);
         pass.set_viewport(x, y, w, h, 0.0, 1.0);
+        let [left, top] = [viewport.x, viewport.y + band.first].map(|v| v as u32);
+        pass.set_scissor_rect(left, top, viewport.width as u32, band.rows as u32);
         groups.iter().zip(0..).for_each(|(group, i)| pass.set_bind_group(i, group, &[]));
         pass.draw(0..3, 0..1);
         drop(pass);

@@ -1,7 +1,13 @@
 //! The options of the action `wgpu`.
 
-use volact_core::{Declaration, Options, ParameterDecl, ParameterType, ParameterValue, parameter::Kind};
+use volact_core::{
+    Declaration, Options, ParameterDecl, ParameterType, ParameterValue,
+    parameter::Kind,
+    slicing::{Rate, Sampling},
+};
 use volact_shaders::gpu::voxels::Wanted;
+
+use crate::bands::MOST_SAMPLES;
 
 /// A thousandth of an 8-bit step.
 pub const TERMINATION: f64 = 1.0 / 255_000.0;
@@ -15,9 +21,35 @@ pub struct Adapter {
     pub low_power: bool,
 }
 
+/// How a picture is made.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Means {
+    /// As is fastest.
+    #[default]
+    Auto,
+    /// By casting rays in a compute stage.
+    Rays,
+    /// By slices, in a fragment stage.
+    Slices,
+}
+
+impl Means {
+    const WORDS: [&'static str; 3] = ["auto", "rays", "slices"];
+
+    fn named(word: &str) -> Self {
+        match word {
+            "rays" => Self::Rays,
+            "slices" => Self::Slices,
+            _ => Self::Auto,
+        }
+    }
+}
+
 /// Options, read.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
+    /// How the picture is made.
+    pub means: Means,
     /// World distance between samples; `None` for half of the smallest voxel.
     pub sample_distance: Option<f64>,
     /// What is left to see when a ray ends.
@@ -28,8 +60,17 @@ pub struct Settings {
     pub hardware: bool,
     /// Whether transparent space is skipped.
     pub skipping: bool,
+    /// Samples that one submission takes at most.
+    pub submission: f64,
     /// Which adapter.
     pub adapter: Adapter,
+}
+
+impl Settings {
+    /// How finely slices lie.
+    pub fn sampling(&self) -> Sampling {
+        Sampling { rate: self.sample_distance.map_or_else(Rate::default, Rate::Distance), ..Sampling::default() }
+    }
 }
 
 /// What `wgpu` says of itself.
@@ -39,12 +80,16 @@ pub fn declaration() -> Declaration {
         ParameterDecl::new(name, ParameterType::Choice, text).choices(words).default(words[0])
     };
     Declaration::new(Kind::Action, "wgpu", env!("CARGO_PKG_VERSION"), text)
-        .with(choice("method", &["auto", "rays"], "how the picture is sampled: rays is casting in a compute stage"))
+        .with(choice(
+            "method",
+            &Means::WORDS,
+            "how the picture is made: by casting rays in a compute stage, or by slices in a fragment stage; auto is rays",
+        ))
         .with(
             ParameterDecl::new(
                 "sample_distance",
                 ParameterType::Float,
-                "distance between samples; half of the smallest voxel unless given",
+                "distance between samples; half of the smallest voxel unless given, for slices half a voxel along the view axis",
             )
             .bounds(f64::MIN_POSITIVE, f64::MAX)
             .unit("world units"),
@@ -77,6 +122,15 @@ pub fn declaration() -> Declaration {
             ParameterType::Choice,
             "a part of the adapter's name; the first by power unless given",
         ))
+        .with(
+            ParameterDecl::new(
+                "submission",
+                ParameterType::Float,
+                "samples that one submission takes at most, lest the driver end it; the picture is the same",
+            )
+            .default(MOST_SAMPLES)
+            .bounds(1.0, f64::MAX),
+        )
         .with(choice("power", &["high", "low"], "which adapter is preferred where there are several"))
 }
 
@@ -89,6 +143,8 @@ impl Settings {
         };
         let number = |name: &str| options.get(name).and_then(ParameterValue::as_float);
         Self {
+            means: Means::named(word("method")),
+            submission: number("submission").unwrap_or(MOST_SAMPLES),
             sample_distance: number("sample_distance"),
             termination: number("termination").unwrap_or(TERMINATION),
             format: Wanted::named(word("format")),

@@ -3,18 +3,42 @@
 use std::{collections::HashMap, sync::Arc};
 
 use volact_core::ActionError;
-use volact_shaders::gpu::{ComposeError, Layout, Recipe, VolumeUse, compose, scene::Key};
+use volact_shaders::gpu::{ComposeError, Layout, Recipe, VolumeUse, compose, compose_slices, runs::Corner, scene::Key};
 
-use crate::{check::NAME, device::Gpu};
+use crate::{check::NAME, device::Gpu, slabs};
 
 /// Pipelines that are kept.
 const MOST: usize = 64;
+
+/// How pictures are made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Stage {
+    /// By rays, in a compute stage.
+    Rays,
+    /// By slabs, in a fragment stage.
+    Slabs {
+        /// Whether shapes are drawn together.
+        together: bool,
+    },
+}
+
+/// What a pipeline depends on.
+type Known = (Key, Stage);
+
+/// A pipeline.
+#[derive(Debug)]
+pub enum Stages {
+    /// Of rays.
+    Rays(wgpu::ComputePipeline),
+    /// Of slabs.
+    Slabs(wgpu::RenderPipeline),
+}
 
 /// A pipeline with its bindings.
 #[derive(Debug)]
 pub struct Pipeline {
     /// The pipeline.
-    pub pipeline: wgpu::ComputePipeline,
+    pub stages: Stages,
     /// The layouts of groups 0 and 1.
     pub groups: [wgpu::BindGroupLayout; 2],
     /// Where numbers lie.
@@ -26,7 +50,7 @@ pub struct Pipeline {
 /// All pipelines.
 #[derive(Debug, Default)]
 pub struct Pipelines {
-    known: HashMap<Key, Arc<Pipeline>>,
+    known: HashMap<Known, Arc<Pipeline>>,
     generation: u64,
 }
 
@@ -35,7 +59,7 @@ impl Pipelines {
     ///
     /// # Errors
     /// If the device cannot bind as much as the shapes need, or refuses the module.
-    pub fn get(&mut self, gpu: &Gpu, key: Key, recipes: &[Recipe]) -> Result<(Arc<Pipeline>, bool), ActionError> {
+    pub fn get(&mut self, gpu: &Gpu, key: Known, recipes: &[Recipe]) -> Result<(Arc<Pipeline>, bool), ActionError> {
         if let Some(known) = self.known.get(&key) {
             return Ok((Arc::clone(known), false));
         }
@@ -49,29 +73,79 @@ impl Pipelines {
     }
 }
 
-fn make(gpu: &Gpu, key: &Key, recipes: &[Recipe], generation: u64) -> Result<Pipeline, ActionError> {
+fn make(gpu: &Gpu, (key, stage): &Known, recipes: &[Recipe], generation: u64) -> Result<Pipeline, ActionError> {
     let wrong = |error: ComposeError| ActionError::Backend { action: NAME.into(), source: Box::new(error) };
-    let made = compose(recipes, key.spans, (key.planes, key.surfaces), gpu.cuts_loops()).map_err(wrong)?;
-    check(gpu, &made.layout)?;
+    let (watched, has) = (gpu.cuts_loops(), (key.planes, key.surfaces));
+    let made = match stage {
+        Stage::Rays => compose(recipes, key.spans, has, watched),
+        Stage::Slabs { together } => compose_slices(recipes, key.spans, has, (key.planes || *together, true), watched),
+    };
+    let made = made.map_err(wrong)?;
+    check(gpu, &made.layout, *stage)?;
     let device = &gpu.device;
     let module = shader_module(device, made.module);
-    let groups = [frame_group(device), volume_group(device, &key.shapes)];
+    let seen = match stage {
+        Stage::Rays => wgpu::ShaderStages::COMPUTE,
+        Stage::Slabs { .. } => wgpu::ShaderStages::FRAGMENT,
+    };
+    let groups = [frame_group(device, seen), volume_group(device, seen, &key.shapes)];
     let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-        label: Some("volact rays"),
+        label: Some("volact picture"),
         bind_group_layouts: &[Some(&groups[0]), Some(&groups[1])],
         immediate_size: 0,
     });
-    let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+    let stages = match stage {
+        Stage::Rays => Stages::Rays(rays(device, &layout, &module)),
+        Stage::Slabs { .. } => Stages::Slabs(runs(device, &layout, &module)),
+    };
+    gpu.check()?;
+    log::debug!("wgpu: a pipeline for {} shapes", key.shapes.len());
+    Ok(Pipeline { stages, groups, layout: made.layout, generation })
+}
+
+fn rays(device: &wgpu::Device, layout: &wgpu::PipelineLayout, module: &wgpu::ShaderModule) -> wgpu::ComputePipeline {
+    device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
         label: Some("volact rays"),
-        layout: Some(&layout),
-        module: &module,
+        layout: Some(layout),
+        module,
         entry_point: Some("volact_picture"),
         compilation_options: wgpu::PipelineCompilationOptions::default(),
         cache: None,
-    });
-    gpu.check()?;
-    log::debug!("wgpu: a pipeline for {} shapes", key.shapes.len());
-    Ok(Pipeline { pipeline, groups, layout: made.layout, generation })
+    })
+}
+
+fn runs(device: &wgpu::Device, layout: &wgpu::PipelineLayout, module: &wgpu::ShaderModule) -> wgpu::RenderPipeline {
+    let corner = wgpu::VertexBufferLayout {
+        array_stride: size_of::<Corner>() as u64,
+        step_mode: wgpu::VertexStepMode::Vertex,
+        attributes: &wgpu::vertex_attr_array![0 => Float32x2, 1 => Sint32x4, 2 => Float32],
+    };
+    // Nothing is written to the attachment.
+    let target = wgpu::ColorTargetState { format: slabs::FORMAT, blend: None, write_mask: wgpu::ColorWrites::empty() };
+    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: Some("volact runs"),
+        layout: Some(layout),
+        vertex: wgpu::VertexState {
+            module,
+            entry_point: Some("volact_corner"),
+            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            buffers: &[Some(corner)],
+        },
+        primitive: wgpu::PrimitiveState {
+            topology: wgpu::PrimitiveTopology::TriangleStrip,
+            ..wgpu::PrimitiveState::default()
+        },
+        depth_stencil: None,
+        multisample: wgpu::MultisampleState::default(),
+        fragment: Some(wgpu::FragmentState {
+            module,
+            entry_point: Some("volact_run"),
+            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            targets: &[Some(target)],
+        }),
+        multiview_mask: None,
+        cache: None,
+    })
 }
 
 /// A module whose loops nobody need bound.
@@ -88,8 +162,16 @@ fn shader_module(device: &wgpu::Device, module: naga::Module) -> wgpu::ShaderMod
 }
 
 /// What the shapes need against what the adapter has.
-fn check(gpu: &Gpu, layout: &Layout) -> Result<(), ActionError> {
+fn check(gpu: &Gpu, layout: &Layout, stage: Stage) -> Result<(), ActionError> {
     let limits = &gpu.limits;
+    if stage != Stage::Rays && gpu.stores_from_fragments() == Some(false) {
+        return Err(ActionError::Limit {
+            action: NAME.into(),
+            what: "stores from fragment stages".into(),
+            found: format!("none on adapter {:?}", gpu.name()),
+            wanted: "an adapter that has them, or method rays".into(),
+        });
+    }
     let needs = [
         ("number of volumes in one picture", layout.textures, limits.max_sampled_textures_per_shader_stage),
         ("number of bound buffers", BUFFERS, limits.max_storage_buffers_per_shader_stage),
@@ -115,9 +197,11 @@ pub fn entry(binding: u32, ty: wgpu::BindingType) -> wgpu::BindGroupLayoutEntry 
     wgpu::BindGroupLayoutEntry { binding, visibility: wgpu::ShaderStages::COMPUTE, ty, count: None }
 }
 
-fn frame_group(device: &wgpu::Device) -> wgpu::BindGroupLayout {
+/// The bindings of group 0, as some stage sees them.
+pub fn frame_group(device: &wgpu::Device, seen: wgpu::ShaderStages) -> wgpu::BindGroupLayout {
     let buffer = |ty| wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None };
     let storage = |read_only| buffer(wgpu::BufferBindingType::Storage { read_only });
+    let entry = |binding, ty| wgpu::BindGroupLayoutEntry { visibility: seen, ..entry(binding, ty) };
     device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
         label: Some("volact frame"),
         entries: &[
@@ -134,7 +218,12 @@ fn frame_group(device: &wgpu::Device) -> wgpu::BindGroupLayout {
     })
 }
 
-fn volume_group(device: &wgpu::Device, shapes: &[(usize, Vec<Option<VolumeUse>>)]) -> wgpu::BindGroupLayout {
+fn volume_group(
+    device: &wgpu::Device,
+    seen: wgpu::ShaderStages,
+    shapes: &[(usize, Vec<Option<VolumeUse>>)],
+) -> wgpu::BindGroupLayout {
+    let entry = |binding, ty| wgpu::BindGroupLayoutEntry { visibility: seen, ..entry(binding, ty) };
     let texture = |volume: &VolumeUse| wgpu::BindingType::Texture {
         sample_type: wgpu::TextureSampleType::Float { filterable: volume.hardware },
         view_dimension: wgpu::TextureViewDimension::D3,

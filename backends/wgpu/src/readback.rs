@@ -3,9 +3,12 @@
 use volact_core::{Frame, Viewport};
 use volact_shaders::gpu::{COUNTERS, CUT_FLAG, FLAGS, OVERLAP_FLAG};
 
-use crate::device::{DeviceError, Gpu};
+use crate::{
+    bands::Band,
+    device::{DeviceError, Gpu},
+};
 
-/// The buffers that a picture is drawn into, and one from which it is read.
+/// The buffers that a band of a picture is drawn into, and one from which the whole is read.
 #[derive(Debug)]
 pub struct Target {
     /// Premultiplied colours, 16 bytes a pixel.
@@ -18,7 +21,36 @@ pub struct Target {
     pub generation: u64,
     staging: wgpu::Buffer,
     timer: Option<Timer>,
+    /// Pixels of the whole picture, and of a band.
     count: usize,
+    room: usize,
+}
+
+/// When the passes of a picture began and ended: timestamps of its first pass and of its last.
+#[derive(Clone, Copy, Debug)]
+pub struct Times<'a> {
+    queries: Option<&'a wgpu::QuerySet>,
+    first: bool,
+    last: bool,
+}
+
+impl<'a> Times<'a> {
+    fn writes(&self, begins: bool, ends: bool) -> Option<(&'a wgpu::QuerySet, Option<u32>, Option<u32>)> {
+        let (begin, end) = ((begins && self.first).then_some(0), (ends && self.last).then_some(1));
+        self.queries.filter(|_| begin.is_some() || end.is_some()).map(|queries| (queries, begin, end))
+    }
+
+    /// Of a compute pass that begins or ends a band.
+    pub fn compute(&self, begins: bool, ends: bool) -> Option<wgpu::ComputePassTimestampWrites<'a>> {
+        let (query_set, beginning_of_pass_write_index, end_of_pass_write_index) = self.writes(begins, ends)?;
+        Some(wgpu::ComputePassTimestampWrites { query_set, beginning_of_pass_write_index, end_of_pass_write_index })
+    }
+
+    /// Of a render pass that may begin a band.
+    pub fn render(&self, begins: bool) -> Option<wgpu::RenderPassTimestampWrites<'a>> {
+        let (query_set, beginning_of_pass_write_index, end_of_pass_write_index) = self.writes(begins, false)?;
+        Some(wgpu::RenderPassTimestampWrites { query_set, beginning_of_pass_write_index, end_of_pass_write_index })
+    }
 }
 
 /// Counts the device's time.
@@ -54,14 +86,14 @@ const FLAG_BYTES: u64 = 4 * FLAGS as u64;
 const TIME_BYTES: u64 = 16;
 
 impl Target {
-    /// Buffers for that many pixels.
-    pub fn new(gpu: &Gpu, count: usize, generation: u64) -> Self {
+    /// Buffers for the pixels of bands, `room` of them, and of the whole picture.
+    pub fn new(gpu: &Gpu, (room, count): (usize, usize), generation: u64) -> Self {
         use wgpu::BufferUsages as U;
         let buffer = |label, size, usage| {
             let descriptor = wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false };
             gpu.device.create_buffer(&descriptor)
         };
-        let pixels = count as u64;
+        let pixels = room as u64;
         let timer = gpu.has(wgpu::Features::TIMESTAMP_QUERY).then(|| Timer {
             queries: gpu.device.create_query_set(&wgpu::QuerySetDescriptor {
                 label: Some("volact time"),
@@ -78,41 +110,41 @@ impl Target {
             staging: buffer("volact staging", Self::staged(count), U::MAP_READ | U::COPY_DST),
             timer,
             count,
+            room,
             generation,
         }
     }
 
-    /// Pixels that there is room for.
-    pub fn room(&self) -> usize {
-        self.count
+    /// Whether there is room for bands of so many pixels, and for that many altogether.
+    pub fn holds(&self, room: usize, count: usize) -> bool {
+        self.room >= room && self.count >= count
     }
 
-    /// Bytes on the device.
+    /// Bytes on the device, with those from which the host reads.
     pub fn bytes(&self) -> usize {
-        20 * self.count + Self::staged(self.count) as usize + FLAG_BYTES as usize
+        20 * self.room + Self::staged(self.count) as usize + FLAG_BYTES as usize
     }
 
     fn staged(count: usize) -> u64 {
         (20 * count as u64).next_multiple_of(8) + FLAG_BYTES.next_multiple_of(8) + TIME_BYTES
     }
 
-    /// When the pass that draws begins and ends.
-    pub fn timestamps(&self) -> Option<wgpu::ComputePassTimestampWrites<'_>> {
-        self.timer.as_ref().map(|timer| wgpu::ComputePassTimestampWrites {
-            query_set: &timer.queries,
-            beginning_of_pass_write_index: Some(0),
-            end_of_pass_write_index: Some(1),
-        })
+    /// The timestamps of a band that is the first, the last, or both.
+    pub fn times(&self, first: bool, last: bool) -> Times<'_> {
+        Times { queries: self.timer.as_ref().map(|timer| &timer.queries), first, last }
     }
 
-    /// Has everything copied to where it is read, for the first `count` pixels.
-    pub fn copy(&self, encoder: &mut wgpu::CommandEncoder, count: usize) {
-        let n = count as u64;
-        if n > 0 {
-            encoder.copy_buffer_to_buffer(&self.pixels, 0, &self.staging, 0, 16 * n);
-            encoder.copy_buffer_to_buffer(&self.depths, 0, &self.staging, 16 * n, 4 * n);
-        }
-        let at = (20 * n).next_multiple_of(8);
+    /// Has a band of the viewport copied to where it is read.
+    pub fn copy_band(&self, encoder: &mut wgpu::CommandEncoder, viewport: &Viewport, band: Band) {
+        let [first, n] = [band.first, band.rows].map(|rows| (rows * viewport.width) as u64);
+        let count = (viewport.width * viewport.height) as u64;
+        encoder.copy_buffer_to_buffer(&self.pixels, 0, &self.staging, 16 * first, 16 * n);
+        encoder.copy_buffer_to_buffer(&self.depths, 0, &self.staging, 16 * count + 4 * first, 4 * n);
+    }
+
+    /// Has what went wrong and counts copied, behind that many pixels.
+    pub fn copy_counts(&self, encoder: &mut wgpu::CommandEncoder, count: usize) {
+        let at = (20 * count as u64).next_multiple_of(8);
         encoder.copy_buffer_to_buffer(&self.flags, 0, &self.staging, at, FLAG_BYTES);
         if let Some(timer) = &self.timer {
             encoder.resolve_query_set(&timer.queries, 0..2, &timer.resolved, 0);

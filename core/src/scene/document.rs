@@ -261,6 +261,8 @@ Scene(version: 1, /* block /* nested */ */ data: {"a": (file: r#"x"y"#, options:
         assert_eq!(error("[1,\n \"x]"), "2:2: found a string without an end, wanted a closing quotation mark");
         assert_eq!(error("{\"a\" 1}"), "1:6: found 1, wanted `:`");
         assert_eq!(error("[1.2.3]"), "1:2: found `1.2.3`, wanted a number");
+        assert_eq!(error("[2._5]"), "1:2: found `2._5`, wanted a number");
+        assert_eq!(error("[-in_f]"), "1:2: found `-in_f`, wanted a number");
         assert_eq!(error("/* x"), "1:1: found a comment without an end, wanted `*/`");
         assert_eq!(error(""), "1:1: found the end of the text, wanted a value");
         assert_eq!(error("[%]"), "1:2: found '%', wanted a value, a name or a bracket");

@@ -242,13 +242,14 @@ fn read_number(word: &str) -> Option<Token> {
         _ => return None,
     };
     let ((base, digits), based) = radix(word);
-    if digits.starts_with('_') {
+    // As RON has it: underscores come after a digit or an exponent's letter, not after a point.
+    if digits.starts_with('_') || digits.contains("._") {
         return None;
     }
-    let digits = digits.replace('_', "");
     if !based && (digits == "inf" || digits == "NaN") {
         return Some(Token::Number { value: format!("{sign}{digits}").parse().ok()?, whole: None });
     }
+    let digits = digits.replace('_', "");
     if !based && !digits.starts_with(|c: char| c.is_ascii_digit() || c == '.') {
         return None;
     }

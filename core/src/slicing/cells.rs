@@ -39,7 +39,7 @@ impl Run {
     /// From number `start` up to, without, `end`.
     pub fn new([start, end]: [i64; 2], ascending: bool) -> Self {
         let count = usize::try_from(end.saturating_sub(start)).unwrap_or(0);
-        Self { first: if ascending { start } else { end - 1 }, count, ascending }
+        Self { first: if ascending { start } else { end.saturating_sub(1) }, count, ascending }
     }
 
     pub fn number(&self, position: usize) -> i64 {
@@ -51,7 +51,7 @@ impl Run {
         let [a, b] = if self.ascending {
             [start.saturating_sub(self.first), end.saturating_sub(self.first)]
         } else {
-            [self.first.saturating_sub(end) + 1, self.first.saturating_sub(start) + 1]
+            [end, start].map(|n| self.first.saturating_sub(n).saturating_add(1))
         };
         [a, b].map(|p| p.clamp(0, self.count as i64) as usize)
     }
@@ -193,5 +193,23 @@ impl<'a> Cells<'a> {
                 *number = mix(at(u), at(v), t);
             }
         });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_at_the_ends_of_all_numbers_are_outside_of_runs() {
+        for ascending in [true, false] {
+            let run = Run::new([-3, 2], ascending);
+            assert_eq!(run.positions([i64::MIN, i64::MAX]), [0, 5]);
+            for far in [i64::MIN, i64::MAX] {
+                let [a, b] = run.positions([far, far]);
+                assert_eq!(a, b, "{far}");
+            }
+            assert_eq!(Run::new([i64::MIN; 2], ascending).count, 0);
+        }
     }
 }

@@ -39,12 +39,14 @@ const CELLS: &str = include_str!("../../wgsl/gpu/cells.wgsl");
 const VERTICES: &str = include_str!("../../wgsl/gpu/vertices.wgsl");
 /// Stretches of a ray in a mesh that are kept at a time, besides one (`VOLACT_STRETCHES`).
 const STRETCHES: u32 = 3;
+const AHEAD: &str = include_str!("../../wgsl/gpu/ahead.wgsl");
+const UNKNOWN: &str = include_str!("../../wgsl/gpu/unknown.wgsl");
 /// The parts of the stage that casts rays.
 const RAYS: [&str; 9] = [
     RAY,
     include_str!("../../wgsl/gpu/rays.wgsl"),
     include_str!("../../wgsl/gpu/lattice.wgsl"),
-    include_str!("../../wgsl/gpu/ahead.wgsl"),
+    AHEAD,
     include_str!("../../wgsl/gpu/light.wgsl"),
     include_str!("../../wgsl/gpu/over.wgsl"),
     include_str!("../../wgsl/gpu/sweep.wgsl"),
@@ -53,10 +55,9 @@ const RAYS: [&str; 9] = [
 ];
 
 /// The parts of the stage that draws slabs.
-const SLICES: [&str; 8] = [
+const SLICES: [&str; 7] = [
     RAY,
     include_str!("../../wgsl/gpu/rays.wgsl"),
-    include_str!("../../wgsl/gpu/unknown.wgsl"),
     include_str!("../../wgsl/gpu/light.wgsl"),
     include_str!("../../wgsl/gpu/over.wgsl"),
     include_str!("../../wgsl/gpu/sweep.wgsl"),
@@ -94,17 +95,30 @@ pub fn compose(
 
 /// Composes the stages that draw slabs of shapes, in the order of [`compose`]: a vertex stage
 /// `volact_corner` and a fragment stage `volact_run`. `sweeps` tells that a run may have several shapes,
-/// surfaces of values or slice planes; the rest as for [`compose`].
+/// surfaces of values or slice planes, `skips` that what can be skipped is bound; the rest as for [`compose`].
 ///
 /// # Errors
 /// As [`compose`].
 pub fn compose_slices(
     recipes: &[Recipe],
     spans: u32,
-    (sweeps, planes, surfaces): (bool, bool, bool),
+    has: (bool, bool),
+    (sweeps, skips): (bool, bool),
     watched: bool,
 ) -> Result<Composition, ComposeError> {
-    stage(recipes, spans, (planes, surfaces, watched), &format!("const ALONES: bool = {};\n", !sweeps), &SLICES)
+    let texts = [&[if skips { AHEAD } else { UNKNOWN }], &SLICES[..]].concat();
+    stage(recipes, spans, (has.0, has.1, watched), &format!("const ALONES: bool = {};\n", !sweeps), &texts)
+}
+
+/// The module of the entry point `volact_finish`, which makes pixels, depths and counts of the light that
+/// slabs have gathered.
+///
+/// # Errors
+/// Never: a test composes it.
+pub fn finish() -> Result<(Module, ModuleInfo), ComposeError> {
+    let module = parse("", &[include_str!("../../wgsl/gpu/light.wgsl"), include_str!("../../wgsl/gpu/finish.wgsl")])?;
+    let info = validate(&module)?;
+    Ok((module, info))
 }
 
 fn stage(

@@ -7,14 +7,15 @@
 //!    functions in place of the stubs of parameters, and a budget for loops.
 //! 4. [`pack`] writes a shape's numbers into their rows, [`table`] a lookup table, [`voxels`] says how
 //!    voxels lie in a texture, [`skip`] where nothing can be seen, [`mesh`] where meshes are,
-//!    [`onto`] how a picture is laid over an application's; [`scene`] does so for all shapes of a frame.
+//!    [`onto`] how a picture is laid over an application's; [`scene`] does so for all shapes of a frame, and
+//!    [`runs`] says what a rasteriser draws of them.
 //!
 //! # Bindings
 //! Group 0: 0 the frame ([`FrameNumbers`], uniform), 1 rows of numbers (uniform), 2 rows of tables, 3 what the
 //! application has drawn, 4 pixels, 5 depths, 6 flags: the shape whose loop overran its budget, plus 1;
 //! then 64 counts of samples and 64 of rays, whether the device has cut a loop short, 64 counts of what was
-//! skipped, and the shape whose cells carry numbers and overlap, plus 1; 7 what can be skipped; 8 rows of meshes. Group 1: 0 a sampler, then the
-//! volumes' textures.
+//! skipped, and the shape whose cells carry numbers and overlap, plus 1; 7 what can be skipped; 8 rows of
+//! meshes. Group 1: 0 a sampler, then the volumes' textures. Slabs have 4 for pixels' light, and no 5.
 //!
 //! All numbers are f32 in [local space](crate::signatures), the origin near the shape.
 
@@ -25,12 +26,13 @@ mod merge;
 pub mod mesh;
 pub mod onto;
 pub mod pack;
+pub mod runs;
 pub mod scene;
 pub mod skip;
 pub mod table;
 pub mod voxels;
 
-pub use compose::{Composition, compose, compose_slices};
+pub use compose::{Composition, compose, compose_slices, finish};
 pub use frame::{Anchor, FrameNumbers};
 pub use layout::{Layout, Recipe, Slot, VolumeUse, is_deep};
 

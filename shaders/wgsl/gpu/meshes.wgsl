@@ -168,16 +168,15 @@ fn volact_keep(found: ptr<function, VolactCrossings>, t: f32, face: u32) {
 fn volact_mesh_stretches(shape: u32, ray: VolactRay, from_rest: VolactRest) -> VolactSpans {
     let base = volact_numbers[8u * shape + 7u].y;
     var rest = from_rest;
-    var line = volact_line(shape, ray, rest.aside);
     var spans: VolactSpans;
     volact_rest.more = false;
     var depth = 0;
     var begin = 0.0;
     loop {
+        let line = volact_line(shape, ray, rest.aside);
         let found = volact_crossings(base, line, rest);
         if found.sum != 0 && rest.aside < 3u && rest.t == -3.0e38 {
             rest.aside += 1u;
-            line = volact_line(shape, ray, rest.aside);
             continue;
         }
         for (var i = 0u; i < found.count; i += 1u) {
@@ -213,15 +212,17 @@ fn volact_is_mesh(shape: u32) -> bool { return (volact_numbers[8u * shape + 4u].
 // What the clips leave of a ray inside a shape, in order: as much as there is room for behind a place;
 // `volact_rest` says where to go on.
 fn volact_spans(shape: u32, ray: VolactRay, rest: VolactRest) -> VolactSpans {
-    if !volact_is_mesh(shape) { return volact_block_spans(shape, ray); }
-    let inside = volact_mesh_stretches(shape, ray, rest);
-    return volact_clipped(shape, ray, volact_kept(inside, vec2<f32>(ray.begin, ray.end)));
+    var inside: VolactSpans;
+    if volact_is_mesh(shape) {
+        inside = volact_kept(volact_mesh_stretches(shape, ray, rest), vec2<f32>(ray.begin, ray.end));
+    } else {
+        inside = volact_block_span(shape, ray);
+    }
+    return volact_clipped(shape, ray, inside);
 }
 
-// Whether a place on a ray is inside a shape; `known` are stretches of it where it is a block.
-fn volact_within(shape: u32, ray: VolactRay, known: VolactSpans, t: f32) -> bool {
-    if !volact_is_mesh(shape) { return volact_held(known, t); }
-    if t < ray.begin || t > ray.end { return false; }
+// Whether a place on a ray is inside a shape.
+fn volact_within(shape: u32, ray: VolactRay, t: f32) -> bool {
     var rest = volact_whole();
     while rest.more {
         let spans = volact_spans(shape, ray, rest);

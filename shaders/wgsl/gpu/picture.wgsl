@@ -1,4 +1,5 @@
-// A picture by casting rays: one invocation a pixel.
+// A picture by casting rays: one invocation a pixel. A dispatch makes a band of rows, from first_row on, and
+// its pixels and depths begin with those.
 
 // What the application has drawn: for each pixel premultiplied colour, then where it is.
 @group(0) @binding(3) var<storage, read> volact_limits: array<vec4<f32>>;
@@ -33,8 +34,9 @@ fn volact_picture(@builtin(global_invocation_id) id: vec3<u32>) {
         let color = volact_flat(shape, ray);
         volact_color = color + (1.0 - color.a) * volact_color;
     }
-    volact_pixels[at] = volact_color;
-    volact_depths[at] = volact_depth;
+    let to = id.y * volact_frame.size.x + id.x;
+    volact_pixels[to] = volact_color;
+    volact_depths[to] = volact_depth;
     if volact_samples + volact_skipped > 0u {
         let counter = 1u + ((id.x >> 3u) + 7u * (id.y >> 3u)) % 64u;
         atomicAdd(&volact_flags[counter], volact_samples);

@@ -100,14 +100,13 @@ fn volact_clipped(shape: u32, ray: VolactRay, whole: VolactSpans) -> VolactSpans
     return spans;
 }
 
-// What the clips leave of a ray inside a block.
-fn volact_block_spans(shape: u32, ray: VolactRay) -> VolactSpans {
+// The stretch inside a block, of which there is no more.
+fn volact_block_span(shape: u32, ray: VolactRay) -> VolactSpans {
     var spans: VolactSpans;
     volact_rest.more = false;
     spans.ends[0] = volact_block(shape, ray);
-    if spans.ends[0].x >= spans.ends[0].y { return spans; }
-    spans.count = 1u;
-    return volact_clipped(shape, ray, spans);
+    spans.count = select(0u, 1u, spans.ends[0].x < spans.ends[0].y);
+    return spans;
 }
 
 // Whether a place is in a stretch, ends included.

@@ -7,7 +7,7 @@
 // yet, 1 some, 2 enough: the ray has ended, 3 shapes that are one picture each are being laid over.
 //
 // A shape that is one picture is one run, after all others. Before those, where there are surfaces, comes a run
-// of no shape, which lays them behind what was gathered.
+// of no shape, which lays them behind what was gathered. Light is that of a band of rows, from first_row on.
 //
 // Levels are counted along the axis from the anchor; slab k begins at k steps and a rest, which is what
 // the anchor lacks to a plane. A run's ends beyond which there is nothing of its shapes are open, so that
@@ -74,7 +74,9 @@ fn volact_gather(run: vec4<i32>, whole: VolactRay) -> bool {
 fn volact_run(corner: VolactCorner) {
     let pixel = vec2<u32>(corner.place.xy);
     if pixel.x >= volact_frame.size.x || pixel.y >= volact_frame.size.y { return; }
-    let at = 2u * (pixel.y * volact_frame.size.x + pixel.x);
+    if pixel.y < volact_frame.first_row { return; }
+    let behind = 2u * (pixel.y * volact_frame.size.x + pixel.x);
+    let at = behind - 2u * volact_frame.first_row * volact_frame.size.x;
     volact_dark();
     let known = volact_light[at + 1u];
     volact_members = vec2<u32>(corner.run.xy);
@@ -89,7 +91,7 @@ fn volact_run(corner: VolactCorner) {
     volact_levels = vec3<f32>(dot(volact_frame.axis, ray.direction), dot(volact_frame.axis, ray.start), corner.rest);
     var limit = volact_frame.infinity;
     if volact_frame.limited != 0u {
-        limit = volact_limits[at + 1u].x;
+        limit = volact_limits[behind + 1u].x;
         ray.end = min(ray.end, limit);
     }
     let surface = volact_first_surface(ray);
@@ -100,14 +102,20 @@ fn volact_run(corner: VolactCorner) {
         volact_samples += 1u;
         volact_meet(vec4<f32>(surface.rgb, 1.0), surface.w);
     } else if flat_one {
-        if known.z != 3.0 && volact_frame.limited != 0u { volact_meet(volact_limits[at], limit); }
+        // What was drawn already lies behind the first picture of its own.
+        if known.z != 3.0 && volact_frame.limited != 0u { volact_meet(volact_limits[behind], limit); }
         let color = volact_flat(volact_members.x, ray);
+        if volact_samples == 0u { return; }
         volact_color = color + (1.0 - color.a) * volact_color;
         state = 3.0;
     } else {
         let before = volact_left;
         if volact_gather(corner.run, ray) { state = 2.0; }
-        if volact_samples == 0u && volact_left == before { return; }
+        if volact_samples + volact_skipped == 0u && volact_left == before { return; }
+        if volact_skipped > 0u {
+            let counter = ((pixel.x >> 3u) + 7u * (pixel.y >> 3u)) % 64u;
+            atomicAdd(&volact_flags[130u + counter], volact_skipped);
+        }
     }
     volact_light[at] = volact_color;
     volact_light[at + 1u] = vec4<f32>(volact_left, volact_depth, state, known.w + f32(volact_samples));

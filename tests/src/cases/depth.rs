@@ -140,7 +140,7 @@ fn pictures(topic: &mut Topic) {
                 scene.desc.depth_threshold = threshold;
                 let frame = rig.draw(&scene, &How::step(0.3))?;
                 let lattice = Lattice::of(&frame.method).map_err(crate::case::Stop::Skip)?;
-                let truth = rig.truth(label, &scene, lattice, DVec3::ZERO)?;
+                let truth = rig.truth(label, &scene, lattice, &crate::truth::Change::default())?;
                 let wanted: Vec<f64> = (0..truth.depth.len())
                     .map(|i| {
                         // Where the ray's opacity only just reaches the threshold, rounding decides.

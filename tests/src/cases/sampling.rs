@@ -251,6 +251,7 @@ fn every_choice(rig: &mut Rig<'_>) -> Verdict {
     let declared = rig.subject().declaration.parameters.clone();
     let choices: Vec<_> = declared.iter().filter(|p| p.types.contains(&ParameterType::Choice)).collect();
     let mut seen = 0;
+    rig.because("a device may interpolate with 8 bits, and need not");
     for option in choices {
         for choice in &option.choices {
             let how = How::step(0.3).with(&option.name, ParameterValue::Choice(choice.clone()));

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use volact_core::{ActionError, Frame, glam::DVec3};
+use volact_core::{ActionError, Frame};
 use volact_cpu::reference::ReferencePicture;
 
 use super::{How, Rig, Scene, line};
@@ -14,7 +14,8 @@ use crate::{
     report::VARIANT,
     reproduce,
     tolerance::{Pair, Sizes, Tolerance},
-    truth::chain,
+    truth::{Change, chain},
+    voxels::{self, Noise},
 };
 
 /// A pixel's closed form; `None` where there is none.
@@ -41,7 +42,8 @@ impl Rig<'_> {
     pub fn on_lattice(&mut self, label: &str, scene: &Scene, frame: &Frame) -> Result<(), Stop> {
         let lattice = Lattice::of(&frame.method).map_err(Stop::Skip)?;
         let pair = self.pair(label, scene, lattice)?;
-        let tolerance = self.tolerance(&pair, scene, frame, lattice);
+        let coarse = self.coarse(label, scene, frame, lattice)?;
+        let tolerance = self.tolerance(&pair, scene, frame, lattice).and("format of voxels", coarse);
         let seen = pair[0].color.iter().any(|c| c[3] > 1e-3);
         self.compare(label, &lattice.name(), scene, frame, &pair[0].color, &tolerance);
         if !seen && let Some(check) = self.checks.last_mut() {
@@ -144,7 +146,7 @@ impl Rig<'_> {
         if !self.subject.has("sample_distance") || self.subject.options.contains_key("sample_distance") {
             return Err(Stop::Skip("the step cannot be set: no option \"sample_distance\", or set by the user".into()));
         }
-        let truth = self.truth(label, scene, Lattice::Exact, DVec3::ZERO)?;
+        let truth = self.truth(label, scene, Lattice::Exact, &Change::default())?;
         let mut errors = Vec::new();
         for &step in steps {
             let frame = self.draw(scene, &how.clone().with("sample_distance", step))?;
@@ -229,16 +231,29 @@ impl Rig<'_> {
         label: &str,
         scene: &Scene,
         lattice: Lattice,
-        shift: DVec3,
+        change: &Change,
     ) -> Result<Arc<ReferencePicture>, Stop> {
         let key = format!("{}/{label}", self.case);
-        let truth = self.truths.get(&key, &self.registry, (&scene.shapes, &scene.desc), lattice, shift);
+        let truth = self.truths.get(&key, &self.registry, (&scene.shapes, &scene.desc), lattice, change);
         truth.map_err(|why| Stop::Fail(format!("no truth: {why}")))
     }
 
     fn pair(&self, label: &str, scene: &Scene, lattice: Lattice) -> Result<[Arc<ReferencePicture>; 2], Stop> {
-        let shift = Sizes::of(&scene.shapes).shift();
-        Ok([self.truth(label, scene, lattice, DVec3::ZERO)?, self.truth(label, scene, lattice, shift)?])
+        let moved = Change { shift: Sizes::of(&scene.shapes).shift(), noise: None };
+        Ok([self.truth(label, scene, lattice, &Change::default())?, self.truth(label, scene, lattice, &moved)?])
+    }
+
+    /// Twice the most that voxels in formats of fewer digits change any pixel: see [`voxels`](crate::voxels).
+    fn coarse(&self, label: &str, scene: &Scene, frame: &Frame, lattice: Lattice) -> Result<f64, Stop> {
+        let mut most = 0f64;
+        for noise in (0..voxels::DRAWN).map_while(|seed| Noise::of(&frame.method, &scene.shapes, seed)) {
+            let change = Change { noise: Some(noise), ..Change::default() };
+            let truth = self.truth(label, scene, lattice, &Change::default())?;
+            let noisy = self.truth(label, scene, lattice, &change)?;
+            let pairs = truth.color.iter().flatten().zip(noisy.color.iter().flatten());
+            most = pairs.fold(most, |most, (a, b)| most.max((a - b).abs()));
+        }
+        Ok(2.0 * most)
     }
 
     fn tolerance(

@@ -11,8 +11,8 @@ use volact_conformance::{
 };
 use volact_core::{
     Appearance, Block, Camera, Clip, ClipRegion, Compositing, Declaration, FrameDesc, Geometry, LookupTable,
-    ParameterDecl, ParameterType, Plane, Registry, ScalarType, ShaderEntry, ShaderText, Shape, Volume, VolumeDesc,
-    VolumeTexture,
+    ParameterDecl, ParameterType, Plane, Registry, ScalarType, ShaderEntry, ShaderText, Shape, SliceStyle, Sliced,
+    Slices, Volume, VolumeDesc, VolumeTexture,
     glam::{DAffine3, DQuat, DVec3},
     parameter::Kind,
 };
@@ -140,10 +140,17 @@ fn gradient_is_lit_as_its_source_says() {
             turn,
             DVec3::new(0.3, -0.1, 0.2),
         ));
-        let [native, source] =
-            [true, false].map(|on| picture(&all, &Setup::post(0.13).with("recognise", on), &shape, &desc));
+        let setup = |on: bool| Setup::post(0.13).with("recognise", on);
+        let [native, source] = [true, false].map(|on| picture(&all, &setup(on), &shape, &desc));
         assert!(source.iter().any(|c| c[3] > 0.05), "round {round}");
         within(&format!("round {round}"), max_error(&native, &source), 1e-4);
+        // An opaque plane shows the colour of what is transparent, too, which is not lit.
+        let plane = Plane::new(DVec3::new(4.0, 3.5, 4.9), random.vector() - 0.5).unwrap();
+        let slices = Slices { planes: vec![plane], style: SliceStyle::Opaque, volume: false };
+        shape[0].set_geometry(Sliced::new(Arc::clone(&shape[0].state().geometry), slices).unwrap());
+        let [native, source] = [true, false].map(|on| picture(&all, &setup(on), &shape, &desc));
+        assert!(source.iter().any(|c| c[3] == 1.0), "round {round}");
+        within(&format!("round {round}, on a plane"), max_error(&native, &source), 1e-4);
     }
 }
 

@@ -8,6 +8,7 @@ use volact::{
     VolumeTexture,
     config::Config,
     core::{
+        Compositing,
         glam::DVec3,
         scene::{DataSpec, KeptData, ParameterSpec, Scene},
     },
@@ -66,21 +67,30 @@ fn volume_shape(
     registry: &Registry,
 ) -> (Shape, Vec<String>) {
     let (appearance, notes) = match &args.shader {
-        Some(shader) if *shader != automatic.shader => grey_look(shader, volume, registry),
+        Some(shader) if *shader != automatic.shader => own_look(shader, volume, automatic, registry),
         _ => (automatic.appearance(), automatic.notes.clone()),
     };
     let texture: VolumeTexture = automatic.texture(volume);
     (Shape::around_texture(&texture, appearance), notes)
 }
 
-/// A shader of the user's choice shows a volume's own range in grey.
-fn grey_look(shader: &str, volume: &Volume, registry: &Registry) -> (Appearance, Vec<String>) {
-    let known = |name: &str| registry.shaders().get(shader).is_some_and(|s| s.declaration.parameter(name).is_some());
-    let range = volume.value_range().unwrap_or([0.0, 1.0]);
+/// A shader of the user's choice: one that looks into a volume gets the table that suits it, one that
+/// makes one value of each ray shows the volume's own range in grey.
+fn own_look(
+    shader: &str,
+    volume: &Volume,
+    automatic: &transfer::Automatic,
+    registry: &Registry,
+) -> (Appearance, Vec<String>) {
     let appearance = Appearance::new(shader);
-    if !known("lookup_table") {
+    let Some(entry) = registry.shaders().get(shader).filter(|s| s.declaration.parameter("lookup_table").is_some())
+    else {
         return (appearance, Vec::new());
+    };
+    if let (Compositing::Over, Some(table)) = (entry.compositing, &automatic.table) {
+        return (appearance.with("lookup_table", table.clone()), automatic.notes.clone());
     }
+    let range = volume.value_range().unwrap_or([0.0, 1.0]);
     (appearance.with("lookup_table", LookupTable::grey(range)), vec![format!("grey from {} to {}", range[0], range[1])])
 }
 

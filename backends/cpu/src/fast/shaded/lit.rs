@@ -167,7 +167,9 @@ pub unsafe fn lit<S: Simd>(
         unsafe {
             let [r, g, b, extinction] = lit.table.medium::<S>(sixteen(values, first));
             let mut colors = [r, g, b];
-            if S::lt_bits(S::splat(0.0), extinction) != 0 {
+            // Only what has an extinction is lit, as in the source, whatever is beside it.
+            let seen = S::lt_bits(S::splat(0.0), extinction) & ALL;
+            if seen != 0 {
                 let places = [sixteen(places[0], first), sixteen(places[1], first), sixteen(places[2], first)];
                 let mut gradient = [[0f32; LANES]; 3];
                 let [gx, gy, gz] = &mut gradient;
@@ -175,7 +177,8 @@ pub unsafe fn lit<S: Simd>(
                 lit.field.gradients(Places { p: &p, maps: &[] }, &mut [gx, gy, gz]);
                 let gradient = load::<S>([&gradient[0], &gradient[1], &gradient[2]]);
                 let direction = load::<S>([&directions[0], &directions[1], &directions[2]]);
-                colors = lit.colors::<S>(colors, gradient, load::<S>(places), direction);
+                let lit = lit.colors::<S>(colors, gradient, load::<S>(places), direction);
+                colors = [S::select(seen, lit[0], r), S::select(seen, lit[1], g), S::select(seen, lit[2], b)];
             }
             let medium = [colors[0], colors[1], colors[2], extinction];
             for c in 0..4 {

@@ -1,4 +1,5 @@
-//! Volumes in meshes: the same pictures as the reference on the lattice of rays.
+//! Volumes in meshes, numbers at vertices and surfaces: the same pictures as the reference on the lattice of rays, and on
+//! that of planes.
 
 use std::{any::Any, slice::from_ref};
 
@@ -14,7 +15,7 @@ use volact_core::{
     glam::{DAffine3, DMat3, DVec3},
 };
 
-use crate::common::{draw_in, errors, rays, registry};
+use crate::common::{all_errors, draw_in, rays, registry};
 
 const STEP: f64 = 0.31;
 
@@ -107,9 +108,10 @@ fn of(geometry: impl Geometry, shader: &str) -> Shape {
 }
 
 fn agree(what: &str, shapes: &[Shape], desc: &FrameDesc) {
-    let [color, depth] = errors(&registry(), &rays(STEP), shapes, desc, STEP);
-    within(&format!("{what}, colour"), color, ROUNDING);
-    within(&format!("{what}, depth"), depth, 1e-3);
+    for (method, [color, depth]) in all_errors(shapes, desc, STEP) {
+        within(&format!("{what}, {method}, colour"), color, ROUNDING);
+        within(&format!("{what}, {method}, depth"), depth, 1e-3);
+    }
 }
 
 #[test]

@@ -10,6 +10,7 @@ use volact_core::{
 use volact_wgpu::{Onto, OntoDepth, WgpuAction};
 
 const SIZE: u32 = 32;
+const METHODS: [&str; 2] = ["rays", "slices"];
 const BACK: [f64; 4] = [0.25, 0.5, 0.75, 1.0];
 
 /// An application with a device, a picture of one colour, and a depth buffer of one depth.
@@ -94,8 +95,13 @@ impl Application {
     }
 }
 
-fn action(application: &Application) -> WgpuAction {
-    let given = ParameterMap::from([("sample_distance".to_owned(), 0.3.into())]);
+/// An action of some method, which draws the picture in some bands.
+fn action(application: &Application, method: &str) -> WgpuAction {
+    let given = ParameterMap::from([
+        ("sample_distance".to_owned(), 0.3.into()),
+        ("method".to_owned(), method.into()),
+        ("submission".to_owned(), 2e4.into()),
+    ]);
     let options = volact_wgpu::declaration().resolve(&given, |_| false).unwrap();
     let (device, queue) = (application.device.clone(), application.queue.clone());
     WgpuAction::with_device(
@@ -145,8 +151,12 @@ fn same(found: &[[u8; 4]], wanted: &[[f64; 4]]) {
 
 #[test]
 fn a_picture_is_laid_over_a_viewport() {
+    METHODS.into_iter().for_each(lays_over_a_viewport);
+}
+
+fn lays_over_a_viewport(method: &str) {
     let application = Application::new(1.0);
-    let (mut action, shape) = (action(&application), shape());
+    let (mut action, shape) = (action(&application, method), shape());
     let viewport = Viewport { x: 5, y: 3, width: 20, height: 24 };
     let desc = FrameDesc { viewport: Some(viewport), ..FrameDesc::new(camera().0, SIZE as usize, SIZE as usize) };
     begin(&mut action, &shape, &desc);
@@ -163,11 +173,15 @@ fn a_picture_is_laid_over_a_viewport() {
 
 #[test]
 fn an_application_s_depth_hides_what_lies_behind() {
+    METHODS.into_iter().for_each(hides_what_lies_behind);
+}
+
+fn hides_what_lies_behind(method: &str) {
     let (camera, world_to_clip) = camera();
     // The depth of the plane through the scene's middle.
     let middle = world_to_clip.project_point3(DVec3::splat(4.0)).z as f32;
     let application = Application::new(middle);
-    let (mut action, shape) = (action(&application), shape());
+    let (mut action, shape) = (action(&application, method), shape());
     let desc = FrameDesc::new(camera, SIZE as usize, SIZE as usize);
     let values = vec![middle; (SIZE * SIZE) as usize];
     let depth = OpaqueDepth::Buffer { values: values.into(), range: DepthRange::ZeroToOne, world_to_clip };
@@ -190,8 +204,12 @@ fn an_application_s_depth_hides_what_lies_behind() {
 
 #[test]
 fn formats_that_cannot_be_blended_are_an_error_and_no_more() {
+    METHODS.into_iter().for_each(goes_on_after_a_wrong_format);
+}
+
+fn goes_on_after_a_wrong_format(method: &str) {
     let application = Application::new(1.0);
-    let (mut action, shape) = (action(&application), shape());
+    let (mut action, shape) = (action(&application, method), shape());
     let desc = FrameDesc::new(camera().0, SIZE as usize, SIZE as usize);
     begin(&mut action, &shape, &desc);
     let [view, _] = application.views();

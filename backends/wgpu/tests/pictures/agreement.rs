@@ -1,4 +1,4 @@
-//! The same picture as the reference on the lattice of rays.
+//! The same picture as the reference, on the lattice of rays and on that of planes.
 
 use std::slice::from_ref;
 
@@ -7,12 +7,12 @@ use volact_conformance::{
     scene::{ball, colors, lut, lut_of, placed, shaded, square, volume},
 };
 use volact_core::{
-    Aabb, Appearance, Camera, Clip, ClipRegion, ControlPoint, Filter, FrameDesc, LookupTable, Plane, Roi, ScalarType,
-    Shape, SliceStyle, Sliced, Slices, VolumeDesc, VolumeTexture,
+    Aabb, Appearance, Camera, Clip, ClipRegion, ControlPoint, Filter, FrameDesc, LookupTable, Opaque, OpaqueDepth,
+    Plane, Roi, ScalarType, Shape, SliceStyle, Sliced, Slices, Viewport, VolumeDesc, VolumeTexture,
     glam::{DAffine3, DVec3},
 };
 
-use crate::common::{errors, rays, registry};
+use crate::common::all_errors;
 
 const STEP: f64 = 0.31;
 
@@ -42,10 +42,11 @@ fn a_ball() -> VolumeTexture {
 }
 
 fn agree(what: &str, shapes: &[Shape], desc: &FrameDesc) {
-    let [color, depth] = errors(&registry(), &rays(STEP), shapes, desc, STEP);
-    within(&format!("{what}, colour"), color, ROUNDING);
-    // Where opacity rises slowly its threshold is reached anywhere near.
-    within(&format!("{what}, depth"), depth, 1e-4);
+    for (method, [color, depth]) in all_errors(shapes, desc, STEP) {
+        within(&format!("{what}, {method}, colour"), color, ROUNDING);
+        // Where opacity rises slowly its threshold is reached anywhere near.
+        within(&format!("{what}, {method}, depth"), depth, 1e-4);
+    }
 }
 
 #[test]
@@ -142,6 +143,22 @@ fn regions_clips_and_slices() {
     }
 }
 
+/// Something opaque in a part of the picture, of which light is left behind it.
+#[test]
+fn what_is_opaque_ends_rays_and_lies_behind_the_rest() {
+    let viewport = Viewport { x: 5, y: 3, width: 21, height: 18 };
+    let desc = FrameDesc { viewport: Some(viewport), ..FrameDesc::new(near().camera, 30, 24) };
+    let pixels = desc.width * desc.height;
+    let distance: Vec<f32> = (0..pixels).map(|i| if i % 3 == 0 { 15.0 } else { f32::INFINITY }).collect();
+    let color: Vec<[f32; 4]> = (0..pixels).map(|i| [0.2, 0.1, (i % 5) as f32 * 0.1, 0.8]).collect();
+    let opaque = Opaque { color: Some(color.into()), depth: OpaqueDepth::Distance(distance.into()) };
+    let desc = desc.with_opaque(opaque);
+    let [table, mip] = [lut_of(&a_ball(), warm(), 1.0), shaded("mip", &a_ball(), warm(), 1.0)];
+    agree("a table", from_ref(&table), &desc);
+    agree("a picture of its own", from_ref(&mip), &desc);
+    agree("both", &[mip, table], &desc);
+}
+
 #[test]
 fn components_of_all_counts() {
     for components in 1..=4 {
@@ -168,9 +185,10 @@ fn scales_and_places_far_away() {
         let eye = target + DVec3::new(4.0, -9.0, 5.0) * scale;
         let view = FrameDesc::new(Camera::perspective(eye, target, DVec3::Z, 60.0), 16, 16);
         let step = STEP * scale;
-        let [color, depth] = errors(&registry(), &rays(step), &[shape], &view, step);
-        within(&format!("scale {scale}, shift {shift}"), color, ROUNDING);
-        within("depth", depth / scale, 1e-4);
+        for (method, [color, depth]) in all_errors(&[shape], &view, step) {
+            within(&format!("scale {scale}, shift {shift}, {method}"), color, ROUNDING);
+            within("depth", depth / scale, 1e-4);
+        }
     }
 }
 

@@ -22,7 +22,12 @@ pub fn registry() -> Registry {
 
 /// `wgpu` with this step and rays that are never cut short.
 pub fn rays(step: f64) -> Setup {
-    Setup::new("wgpu").step(step).with("termination", 0.0)
+    Setup::new("wgpu").with("method", "rays").step(step).with("termination", 0.0)
+}
+
+/// The same by slices.
+pub fn slices(step: f64) -> Setup {
+    Setup::new("wgpu").with("method", "slices").step(step).with("termination", 0.0)
 }
 
 /// A picture of shapes by a fresh action of a registry.
@@ -35,21 +40,38 @@ pub fn draw(setup: &Setup, shapes: &[Shape], desc: &FrameDesc) -> Frame {
     draw_in(&registry(), setup, shapes, desc)
 }
 
-/// The reference on the lattice of rays, in a registry.
-pub fn truth_in(registry: &Registry, shapes: &[Shape], desc: &FrameDesc, step: f64) -> ReferencePicture {
-    let options =
-        ReferenceOptions { method: Method::Rays, sample_distance: step, threads: 2, ..ReferenceOptions::default() };
+/// The reference on a lattice, in a registry.
+pub fn truth_in(
+    registry: &Registry,
+    shapes: &[Shape],
+    desc: &FrameDesc,
+    (method, step): (Method, f64),
+) -> ReferencePicture {
+    let options = ReferenceOptions { method, sample_distance: step, threads: 2, ..ReferenceOptions::default() };
     let resolve = |s: &Shape| ResolvedShape::new(s, registry.shaders()).unwrap();
     integrate(&shapes.iter().map(resolve).collect::<Vec<_>>(), desc, &options).unwrap()
 }
 
 /// How far a picture is from the reference on its own lattice, in any channel, and how far its depths
 /// are where both have one.
-pub fn errors(registry: &Registry, setup: &Setup, shapes: &[Shape], desc: &FrameDesc, step: f64) -> [f64; 2] {
-    let truth = truth_in(registry, shapes, desc, step);
+pub fn errors(
+    registry: &Registry,
+    setup: &Setup,
+    shapes: &[Shape],
+    desc: &FrameDesc,
+    lattice: (Method, f64),
+) -> [f64; 2] {
+    let truth = truth_in(registry, shapes, desc, lattice);
     let found = draw_in(registry, setup, shapes, desc);
     let color = volact_conformance::metrics::outside(&wide(&found), &truth);
     let depths = found.depth.iter().zip(&truth.depth);
     let miss = depths.map(|(a, b)| if a.is_finite() && b.is_finite() { (f64::from(*a) - b).abs() } else { 0.0 });
     [color, miss.fold(0.0, f64::max)]
+}
+
+/// The errors of rays, and those of slices.
+pub fn all_errors(shapes: &[Shape], desc: &FrameDesc, step: f64) -> [(&'static str, [f64; 2]); 2] {
+    let registry = registry();
+    let both = [("rays", rays(step), Method::Rays), ("slices", slices(step), Method::Planes)];
+    both.map(|(name, setup, method)| (name, errors(&registry, &setup, shapes, desc, (method, step))))
 }

@@ -1,12 +1,21 @@
-//! Runs: slabs, one behind the other, of shapes between which no other shape comes.
+//! Runs: slabs, one behind the other, of shapes between which no other shape comes. What a rasteriser
+//! draws of a frame: a convex polygon for each run, in the order from front to back.
+
+use std::{borrow::Cow, sync::Arc};
 
 use bytemuck::{Pod, Zeroable};
 use volact_core::{
-    glam::DVec2,
-    slicing::{Order, Slicing},
+    ActionError, Block, FrameDesc, Geometry, ParameterValue,
+    glam::{DVec2, DVec3},
+    resolve::ResolvedShape,
+    slicing::{Order, Sampling, Slicing, SlicingError, Solid},
 };
 
-use crate::stream::Polygon;
+use super::{
+    is_deep,
+    mesh::{Meshes, is_mesh},
+    scene::{Item, Seen},
+};
 
 /// Rays may end where slabs of these numbers begin, and so do runs.
 const WHOLE: i64 = 32;
@@ -30,10 +39,128 @@ struct Run {
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Corner {
-    place: [f32; 2],
+    /// In clip space.
+    pub place: [f32; 2],
     /// The first shape, the one after the last, the first slab, and the one after the last.
-    run: [i32; 4],
-    rest: f32,
+    pub run: [i32; 4],
+    /// Where the slab from which the others are counted begins, seen from the anchor.
+    pub rest: f32,
+}
+
+/// A run as a strip of triangles.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Polygon {
+    /// The first of its corners.
+    pub first: u32,
+    /// How many it has.
+    pub count: u32,
+}
+
+/// Which way y runs in clip space.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Upward {
+    /// As in pixels: down (Vulkan).
+    No,
+    /// Up (WebGPU, Metal, Direct3D).
+    Yes,
+}
+
+/// What is to be drawn in slabs.
+#[derive(Debug)]
+pub struct Sliced<'a> {
+    /// Items in the order of their module: those composited in depth first, by groups.
+    pub items: Vec<Item<'a>>,
+    /// What is sliced of them.
+    pub solids: Vec<Solid>,
+    /// How many are composited in depth: the first.
+    deep: usize,
+}
+
+impl<'a> Sliced<'a> {
+    /// Items, whose `meshes` are packed, with what is sliced of them; those of which nothing is there are left
+    /// out. `action` is whose errors are told.
+    ///
+    /// # Errors
+    /// If a geometry is damaged, or the frame cannot be sliced.
+    pub fn new(
+        action: &str,
+        (mut items, meshes): (Vec<Item<'a>>, &Meshes),
+        desc: &FrameDesc,
+        sampling: &Sampling,
+    ) -> Result<Self, ActionError> {
+        // Those composited in depth come first, in an order that does not depend on that of drawing.
+        items.sort_by_key(|i| if is_deep(i.program.compositing()) { (0, i.shape.id) } else { (1, 0) });
+        let mut made = Self { items: Vec::with_capacity(items.len()), solids: Vec::new(), deep: 0 };
+        for item in items {
+            let Some(shape) = boxed(item.shape, meshes) else { continue };
+            if let Some(solid) = Solid::new(&shape, None)? {
+                made.deep += usize::from(is_deep(item.program.compositing()));
+                made.solids.push(solid);
+                made.items.push(item);
+            }
+        }
+        if made.deep > 1 {
+            let order = in_groups(&made.slicing(action, desc, sampling)?, made.deep).0;
+            made.items = in_order(made.items, &order);
+            made.solids = in_order(made.solids, &order);
+        }
+        Ok(made)
+    }
+
+    /// The plan of a frame.
+    ///
+    /// # Errors
+    /// If it cannot be sliced.
+    pub fn slicing(&self, action: &str, desc: &FrameDesc, sampling: &Sampling) -> Result<Slicing<'_>, ActionError> {
+        Slicing::new(self.solids.iter().collect(), desc, sampling).map_err(|error| told(action, error))
+    }
+
+    /// Stretches of items that are drawn together, from front to back.
+    pub fn groups(&self, slicing: &Slicing<'_>) -> Vec<[usize; 2]> {
+        in_groups(slicing, self.deep).1
+    }
+}
+
+/// A shape for its slabs: of a mesh the box around it, in which fragments find the mesh themselves.
+/// `None` where it has no extent.
+fn boxed<'a>(shape: &'a ResolvedShape, meshes: &Meshes) -> Option<Cow<'a, ResolvedShape>> {
+    if !is_mesh(shape) {
+        return Some(Cow::Borrowed(shape));
+    }
+    let bounds = meshes.bounds(shape)?;
+    let block: Arc<dyn Geometry> = Arc::new(Block::new(bounds.min, bounds.size()).ok()?);
+    let mut made = shape.clone();
+    made.state.geometry = block;
+    made.parameters.retain(|_, value| !matches!(value, ParameterValue::Attribute(_)));
+    Some(Cow::Owned(made))
+}
+
+/// Things in another order.
+fn in_order<T>(things: Vec<T>, order: &[usize]) -> Vec<T> {
+    let mut things: Vec<Option<T>> = things.into_iter().map(Some).collect();
+    order.iter().filter_map(|i| things[*i].take()).collect()
+}
+
+/// Why a frame cannot be sliced, as an error of an action.
+fn told(action: &str, error: SlicingError) -> ActionError {
+    match error {
+        SlicingError::Camera(error) => ActionError::Frame(error.into()),
+        SlicingError::TooMany { shape, found, wanted } => ActionError::Limit {
+            action: action.into(),
+            what: format!("number of planes, one each sample distance, through shape {shape:?}"),
+            found,
+            wanted: format!("at most {wanted}"),
+        },
+        other => ActionError::Backend { action: action.into(), source: Box::new(other) },
+    }
+}
+
+/// The slab from which slabs are counted on the device, and its level seen from the anchor.
+pub fn border(seen: &Seen, step: f64) -> (i64, f64) {
+    let linear = seen.grid.linear();
+    let level = linear.axis.dot(seen.anchor.point - linear.eye.unwrap_or(DVec3::ZERO));
+    let base = 32.0 * (level / (32.0 * step)).round();
+    (base as i64, base * step - level)
 }
 
 /// The slabs of a shape: numbers of the first and of the one after the last, and levels.
@@ -46,7 +173,7 @@ struct Reach {
 /// Shapes in an order in which each group of shapes that are composited in depth is a stretch, which does
 /// not depend on the view; then the others as they are. With it the groups from front to back, as
 /// stretches of that order. `deep` is how many are composited in depth: the first.
-pub fn in_groups(slicing: &Slicing<'_>, deep: usize) -> (Vec<usize>, Vec<[usize; 2]>) {
+fn in_groups(slicing: &Slicing<'_>, deep: usize) -> (Vec<usize>, Vec<[usize; 2]>) {
     let members = |group: &Vec<usize>| group.iter().copied().filter(|i| *i < deep).collect::<Vec<_>>();
     let groups: Vec<Vec<usize>> = slicing.groups().iter().map(members).filter(|g| !g.is_empty()).collect();
     let mut lasting = groups.clone();
@@ -61,14 +188,16 @@ pub fn in_groups(slicing: &Slicing<'_>, deep: usize) -> (Vec<usize>, Vec<[usize;
 
 /// The runs of a plan from front to back, as polygons of corners; then one for each shape that is a picture
 /// of its own; between these, where there are `surfaces`, one of no shape over the whole picture. `groups` are
-/// stretches of shapes, as of [`in_groups`]. Slabs are counted from `base`;
-/// `rest` is where that one begins, seen from the anchor.
+/// stretches of shapes, as of [`Sliced::groups`]. Slabs are counted from `base`;
+/// `rest` is where that one begins, seen from the anchor, as of [`border`].
 pub fn corners(
     slicing: &Slicing<'_>,
     groups: &[[usize; 2]],
     (base, rest): (i64, f64),
     surfaces: bool,
+    upward: Upward,
 ) -> (Vec<Corner>, Vec<Polygon>) {
+    let sign = if upward == Upward::Yes { DVec2::new(1.0, -1.0) } else { DVec2::ONE };
     let (mut all, mut polygons) = (Vec::new(), Vec::new());
     let number = |n: Option<i64>, open: i32| n.map_or(open, |n| (n - base) as i32);
     for run in runs(slicing, groups, surfaces) {
@@ -79,12 +208,17 @@ pub fn corners(
         polygons.push(Polygon { first: all.len() as u32, count: hull.len() as u32 });
         let [from, to] = run.shapes.map(|s| s as i32);
         let numbers = [from, to, number(run.first, -OPEN), number(run.end, OPEN)];
-        all.extend(hull.iter().map(|p| {
-            let place = 2.0 * *p / slicing.pixel_map().size() - DVec2::ONE;
+        all.extend(strip(hull.len()).map(|i| {
+            let place = sign * (2.0 * hull[i] / slicing.pixel_map().size() - DVec2::ONE);
             Corner { place: place.as_vec2().to_array(), run: numbers, rest: rest as f32 }
         }));
     }
     (all, polygons)
+}
+
+/// The corners of a convex polygon as a strip of triangles: from one side to the other and back.
+fn strip(count: usize) -> impl Iterator<Item = usize> {
+    (0..count).map(move |i| if i % 2 == 0 { i / 2 } else { count - 1 - i / 2 })
 }
 
 /// What a run covers: the hull of one shape, the rectangle around those of several, all where it is of none.
@@ -193,11 +327,29 @@ mod tests {
         assert!(all[0].first.is_none() && all[all.len() - 1].end.is_none());
         let slabs: f64 = all.iter().map(|r| (r.levels[1] - r.levels[0]) / 0.1).sum();
         assert_eq!(slabs.round() as usize, slicing.step().planes);
-        let (corners, polygons) = corners(&slicing, &groups, (64, 0.25), false);
+        let (corners, polygons) = corners(&slicing, &groups, (64, 0.25), false, Upward::No);
         assert_eq!(polygons.len(), all.len());
         assert!(corners.iter().all(|c| c.place.iter().all(|v| v.abs() < 1.1) && c.rest == 0.25));
+        // The same polygons, turned upside down.
+        let (turned, _) = super::corners(&slicing, &groups, (64, 0.25), false, Upward::Yes);
+        assert!(corners.iter().zip(&turned).all(|(a, b)| a.place == [b.place[0], -b.place[1]] && a.run == b.run));
         let second = &corners[polygons[1].first as usize];
         assert_eq!(i64::from(second.run[2]), all[1].first.unwrap() - 64);
+    }
+
+    #[test]
+    fn strips_cover_convex_polygons_once() {
+        for count in 3..12 {
+            let corner = |i: usize| {
+                let turn = std::f64::consts::TAU * i as f64 / count as f64;
+                DVec2::new(turn.cos(), turn.sin())
+            };
+            let all: Vec<DVec2> = strip(count).map(corner).collect();
+            let area = |t: &[DVec2]| 0.5 * (t[1] - t[0]).perp_dot(t[2] - t[0]).abs();
+            let sum: f64 = all.windows(3).map(area).sum();
+            let whole = 0.5 * count as f64 * (std::f64::consts::TAU / count as f64).sin();
+            assert!((sum - whole).abs() < 1e-12, "{count}: {sum} {whole}");
+        }
     }
 
     #[test]
