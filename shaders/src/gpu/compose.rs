@@ -159,9 +159,9 @@ fn stage(
     for (number, recipe) in recipes.iter().enumerate() {
         shapes.push(Shape::import(&mut merger, recipe, (number, watch), &layout.slots[number])?);
     }
-    for (hook, entry) in [("volact_shade", Entry::Shade), ("volact_value_of", Entry::Value)] {
+    for (hook, entry, who) in HOOKED {
         let budget = if watched { LOOP_BUDGET / 2 } else { LOOP_BUDGET };
-        let function = dispatch(&mut merger, &mut import, (&stage, hook), (entry, budget), &shapes)?;
+        let function = dispatch(&mut merger, &mut import, (&stage, hook), (entry, budget), (&shapes, &|i: usize| who(kinds[i], planes)))?;
         let handle = named(&stage, hook).ok_or_else(|| ComposeError::inner(format!("no hook {hook}")))?;
         let made = merger.module.functions.append(function, Span::UNDEFINED);
         import.substitute(handle, made);
@@ -344,13 +344,25 @@ fn accessor(derived: Derived, module: &Module, stub: Handle<Function>) -> &'stat
     }
 }
 
-/// A function that calls that of a shape, by its number.
+/// Whose functions a hook calls, by compositing and by whether there are slice planes.
+type Who = fn(Compositing, bool) -> bool;
+
+/// The stage's hooks.
+const HOOKED: [(&str, Entry, Who); 5] = [
+    ("volact_shade", Entry::Shade, |kind, _| kind == Compositing::Over),
+    ("volact_shade_hit", Entry::Shade, |kind, planes| kind == Compositing::First || planes && is_deep(kind)),
+    ("volact_shade_flat", Entry::Shade, |kind, _| !is_deep(kind)),
+    ("volact_value_hit", Entry::Value, |kind, _| kind == Compositing::First),
+    ("volact_value_flat", Entry::Value, |kind, _| !is_deep(kind)),
+];
+
+/// A function that calls that of a shape that is there, by its number.
 fn dispatch(
     merger: &mut Merger,
     import: &mut Import<'_>,
     (stage, hook): (&Module, &str),
     (entry, budget): (Entry, u32),
-    shapes: &[Shape],
+    (shapes, there): (&[Shape], &dyn Fn(usize) -> bool),
 ) -> Result<Function, ComposeError> {
     let handle = named(stage, hook).ok_or_else(|| ComposeError::inner(format!("no hook {hook}")))?;
     let model = &stage.functions[handle];
@@ -370,7 +382,7 @@ fn dispatch(
     let shape = made.expressions.append(Expression::FunctionArgument(0), Span::UNDEFINED);
     let sample = made.expressions.append(Expression::FunctionArgument(1), Span::UNDEFINED);
     let mut cases = Vec::new();
-    for (number, other) in shapes.iter().enumerate() {
+    for (number, other) in shapes.iter().enumerate().filter(|(i, _)| there(*i)) {
         let Some((_, function)) = other.entries.iter().find(|(e, _)| *e == entry) else { continue };
         let mut body = Block::new();
         let given = match other.sample {

@@ -15,7 +15,7 @@ fn volact_flat(shape: u32, ray: VolactRay) -> vec4<f32> {
     var value = all.value;
     if kind == VOLACT_AVERAGE { value = value / all.length; }
     if kind == VOLACT_ADD { value = value / volact_floats(8u * shape).w; }
-    return volact_premultiplied(volact_shade(shape, volact_sample(shape, ray, all.begin, all.inside, value)));
+    return volact_premultiplied(volact_shade_flat(shape, volact_sample(shape, ray, all.begin, all.inside, value)));
 }
 
 // The value of what was seen, the length of that, the length inside, and where that begins.
@@ -37,7 +37,7 @@ fn volact_reduced_spans(shape: u32, ray: VolactRay, spans: VolactSpans, before: 
             border = volact_border(k);
             let t1 = min(border, b);
             if t1 > t0 {
-                let v = volact_value_of(shape, volact_sample(shape, ray, 0.5 * (t0 + t1), t1 - t0, 0.0));
+                let v = volact_value_flat(shape, volact_sample(shape, ray, 0.5 * (t0 + t1), t1 - t0, 0.0));
                 volact_samples += 1u;
                 if !volact_is_nan(v) {
                     all.value = volact_reduced(kind, all.value, all.length, v, t1 - t0);

@@ -62,7 +62,9 @@ fn volact_gather(run: vec4<i32>, whole: VolactRay) -> bool {
     ray.end = min(ray.end, volact_reach.y);
     let first = volact_members.x;
     let numbers = volact_numbers[8u * first + 5u];
-    if ALONES || (volact_members.y == first + 1u && volact_kind(first) == 0u && numbers.w == 0u) {
+    // Of meshes both would take long to compile.
+    let single = !MESHES && volact_members.y == first + 1u && volact_kind(first) == 0u && numbers.w == 0u;
+    if ALONES || single {
         volact_over(first, ray);
     } else {
         volact_sweep(ray);

@@ -169,7 +169,7 @@ fn volact_cross(shape: u32, ray: VolactRay) -> f32 {
         var at = from_t + f32(parts) * width;
         if sought == VOLACT_START { at = t0; }
         if sought == VOLACT_END { at = t1; }
-        let v = volact_value_of(shape, volact_sample(shape, ray, at, volact_frame.step, 0.0));
+        let v = volact_value_hit(shape, volact_sample(shape, ray, at, volact_frame.step, 0.0));
         if sought == VOLACT_START {
             a = v;
             sought = VOLACT_END;
@@ -244,7 +244,7 @@ fn volact_find(ray: VolactRay, t: f32, added: bool) {
                 if !CROSSES || volact_tracks[shape].crossing > t { break; }
                 value = volact_current(shape);
             }
-            let m = volact_shade(shape, volact_sample(shape, ray, t, volact_frame.step, value));
+            let m = volact_shade_hit(shape, volact_sample(shape, ray, t, volact_frame.step, value));
             var color = volact_premultiplied(m);
             if slice {
                 color = volact_on_slice(shape, m);
