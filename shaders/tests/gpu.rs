@@ -12,19 +12,24 @@ use volact_shaders::{
 const EXACT: VolumeUse = VolumeUse { channels: 1, nearest: false, hardware: false };
 
 fn recipe(entry: &ShaderEntry, volume: Option<VolumeUse>) -> Recipe {
+    shaped(entry, volume, false)
+}
+
+fn shaped(entry: &ShaderEntry, volume: Option<VolumeUse>, mesh: bool) -> Recipe {
     let program = Program::new(entry).unwrap_or_else(|error| panic!("{error}"));
     let use_of = |p| volume.filter(|_| kind_of(p) == Some(ParameterType::Volume));
     let volumes = entry.declaration.parameters.iter().map(use_of).collect();
-    Recipe { program, volumes }
+    Recipe { program, volumes, mesh, carries: mesh, pre: None }
 }
 
 /// Composes, validates and writes; gives the words of SPIR-V.
 fn words(recipes: &[Recipe], spans: u32, planes: bool) -> Vec<u32> {
-    compose(recipes, spans, planes, true).unwrap_or_else(|error| panic!("watched: {error}"));
+    let has = (planes, spans > 2);
+    compose(recipes, spans, has, true).unwrap_or_else(|error| panic!("watched: {error}"));
     for skips in [false, true] {
-        compose_slices(recipes, spans, (planes, skips), true).unwrap_or_else(|error| panic!("slabs: {error}"));
+        compose_slices(recipes, spans, has, (true, skips), true).unwrap_or_else(|error| panic!("slabs: {error}"));
     }
-    let made = compose(recipes, spans, planes, false).unwrap_or_else(|error| panic!("{error}"));
+    let made = compose(recipes, spans, has, false).unwrap_or_else(|error| panic!("{error}"));
     let options = spv::Options { lang_version: (1, 3), ..spv::Options::default() };
     spv::write_vec(&made.module, &made.info, &options, None).unwrap()
 }
@@ -53,6 +58,7 @@ fn every_shader_is_a_valid_module_for_every_way_of_reading() {
         for volume in uses {
             for (spans, planes) in [(1, false), (3, true)] {
                 words(&[recipe(entry, volume)], spans, planes);
+                words(&[shaped(entry, volume, true)], spans, planes);
             }
         }
     }
@@ -62,8 +68,9 @@ fn every_shader_is_a_valid_module_for_every_way_of_reading() {
 fn shaders_are_merged_into_one_march() {
     let mut recipes: Vec<_> = all().iter().map(|entry| recipe(entry, Some(EXACT))).collect();
     recipes.sort_by_key(|r| !gpu::is_deep(r.program.compositing()));
-    let words = words(&recipes, 2, true);
-    assert!(words.len() > 1000);
+    assert!(words(&recipes, 2, true).len() > 1000);
+    recipes.iter_mut().step_by(2).for_each(|r| (r.mesh, r.carries) = (true, true));
+    assert!(words(&recipes, 2, true).len() > 1000);
 }
 
 #[test]
@@ -115,7 +122,7 @@ fn loops_of_authors_ask_for_their_budget() {
     let source = ShaderText { file: "spin.wgsl".into(), text: text.into() };
     let declaration = Declaration::new(Kind::Shader, "spin", "1", "spins");
     let entry = ShaderEntry { declaration, compositing: Compositing::Over, source: Some(source.into()) };
-    let made = compose(&[recipe(&entry, None)], 1, false, false).unwrap();
+    let made = compose(&[recipe(&entry, None)], 1, (false, false), false).unwrap();
     let asked = |name: &str| {
         let (_, f) = made.module.functions.iter().find(|(_, f)| f.name.as_deref() == Some(name)).unwrap();
         let called = f.expressions.iter().filter(|(_, e)| match e {
@@ -125,6 +132,16 @@ fn loops_of_authors_ask_for_their_budget() {
         called.count()
     };
     assert_eq!((asked("s0_spin"), asked("s0_shade")), (1, 2));
+}
+
+#[test]
+fn tables_before_interpolation_are_a_valid_module() {
+    let entry = builtin().unwrap().into_iter().find(|e| e.declaration.name == "lut").unwrap();
+    let place = |kind| entry.declaration.parameters.iter().position(|p| kind_of(p) == Some(kind)).unwrap();
+    let pre = Some([place(ParameterType::Volume), place(ParameterType::Table)]);
+    for volume in [EXACT, VolumeUse { channels: 4, nearest: true, hardware: true }] {
+        words(&[Recipe { pre, ..recipe(&entry, Some(volume)) }], 1, false);
+    }
 }
 
 #[test]

@@ -11,8 +11,14 @@ use volact_conformance::{outcome::Status, rig::registry, runner::Suite, subject:
 use volact_core::{ActionError, Options, ParameterValue};
 
 /// The actions, with options beside those that cases wish.
-const SUBJECTS: &[(&str, &[(&str, &str)])] =
-    &[("cpu", &[]), ("cpu", &[("recognise", "false")]), ("reference", &[]), ("wgpu", &[]), ("vulkan", &[])];
+const SUBJECTS: &[(&str, &[(&str, &str)])] = &[
+    ("cpu", &[]),
+    ("cpu", &[("recognise", "false")]),
+    ("reference", &[]),
+    ("wgpu", &[]),
+    ("wgpu", &[("method", "slices")]),
+    ("vulkan", &[]),
+];
 
 /// Those that need a device.
 const ON_DEVICES: [&str; 2] = ["wgpu", "vulkan"];
@@ -31,10 +37,6 @@ const ALLOWED: &[(&str, &str, &str)] = &[
 
 /// What actions on GPUs do not draw yet, or what they do not have: parts of reasons, of any case.
 const NOT_ON_GPUS: &[&str] = &[
-    "it does not draw shader \"attribute\"",
-    "it does not draw shader \"surface\"",
-    "does not draw geometry ",
-    "the pre-interpolated table",
     "evaluated in single precision",
     "no option \"classification\"",
     "no option \"threads\"",
@@ -49,7 +51,10 @@ fn main() {
     let suite = Arc::new(Suite::new(&registry).expect("built-in shaders are well named"));
     let mut trials = Vec::new();
     for (action, options) in SUBJECTS {
-        let option = |(name, value): &(&str, &str)| ((*name).to_owned(), ParameterValue::Bool(*value == "true"));
+        let option = |(name, value): &(&str, &str)| {
+            let value = value.parse().map_or_else(|_| ParameterValue::Choice((*value).into()), ParameterValue::Bool);
+            ((*name).to_owned(), value)
+        };
         let options: Options = options.iter().map(option).collect();
         let device = ON_DEVICES.contains(action);
         let subject = match suite.subject(action, &options) {

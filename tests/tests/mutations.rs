@@ -89,6 +89,7 @@ const ON_GPUS: &[(&str, &str, &str, &[&str])] = &[
     ("maximum_from_zero", "a maximum that begins at zero", "", &["shaders"]),
     ("sum_without_unit", "the line integral not divided by the unit", "", &["shaders"]),
     ("average_without_length", "the mean not divided by the length", "", &["shaders", "clipping"]),
+    ("first_in_last_out", "a mesh as one interval from first in to last out", "", &["geometry"]),
     ("early_termination", "rays that end at a fifth, whatever was declared", "", &["sampling"]),
     ("uncut_ends", "the first segment not cut by the shape", "", &["sampling"]),
     ("missing_cosine", "slabs as far apart along a ray as along the axis", "vulkan", &["cameras"]),

@@ -8,7 +8,10 @@ use volact_core::{
 };
 use volact_shaders::{
     Programs,
-    gpu::scene::{Item, cut_short, overrun},
+    gpu::{
+        mesh::surface::is_surface,
+        scene::{Item, cut_short, overlapping, overrun},
+    },
 };
 
 use crate::{
@@ -67,19 +70,26 @@ impl VulkanAction {
     fn fetch(&mut self, shape: &ResolvedShape) -> Result<(), ActionError> {
         let Fetched { bytes, rebuilt } = &mut self.fetched;
         *bytes += self.drawing.volumes.prepare(&self.gpu, shape, &self.settings, rebuilt)?;
+        if let Some(bytes) = self.drawing.meshes.prepare(NAME, shape)? {
+            rebuilt.push(Rebuild { shape: shape.name.clone(), what: "mesh".into(), bytes });
+        }
         Ok(())
     }
 
     fn picture(&mut self, desc: &FrameDesc, drawn: &[&ResolvedShape]) -> Result<Frame, ActionError> {
+        let (surfaces, solid): (Vec<_>, Vec<_>) = drawn.iter().copied().partition(|s| is_surface(s));
         let item = |shape| Ok(Item { shape, program: self.programs.of(shape)? });
-        let items = drawn.iter().copied().map(item).collect::<Result<Vec<_>, ActionError>>()?;
+        let items = solid.into_iter().map(item).collect::<Result<Vec<_>, ActionError>>()?;
         let Fetched { bytes, mut rebuilt } = std::mem::take(&mut self.fetched);
-        let made = self.drawing.draw(&self.gpu, desc, items, &self.settings, &mut rebuilt)?;
+        let made = self.drawing.draw(&self.gpu, desc, (items, &surfaces), &self.settings, &mut rebuilt)?;
         let mut frame = Frame::empty(desc);
         if let Some((target, limits)) = self.drawing.target() {
             let counts = target.read(&mut frame, &desc.viewport(), made.shift, desc.depth_threshold, limits);
             if let Some(number) = counts.overrun {
                 return Err(overrun(made.order.get(number), drawn, self.gpu.cuts_loops()));
+            }
+            if let Some(number) = counts.overlapping {
+                return Err(overlapping(NAME, made.order.get(number)));
             }
             if counts.cut {
                 return Err(cut_short(NAME, self.gpu.name(), made.step.distance));
@@ -160,8 +170,7 @@ impl RenderAction for VulkanAction {
         let programs = &self.programs;
         let mut found = None;
         self.lifecycle.manage(shape, |shape| {
-            programs.of(shape)?;
-            check(shape)?;
+            check(shape, programs)?;
             found = Some(shape.clone());
             Ok(())
         })?;
@@ -181,8 +190,9 @@ impl RenderAction for VulkanAction {
     fn begin_draw(&mut self, frame: &FrameDesc) -> Result<(), ActionError> {
         let started = Instant::now();
         let programs = &self.programs;
-        let open = self.lifecycle.begin(frame, |shape| programs.of(shape).and_then(|_| check(shape)))?;
+        let open = self.lifecycle.begin(frame, |shape| check(shape, programs))?;
         let shapes: Vec<ResolvedShape> = open.shapes.values().cloned().collect();
+        self.drawing.meshes.retain(shapes.iter());
         let kept = self.drawing.volumes.retain(shapes.iter()).map_err(ActionError::from);
         if let Err(error) = kept.and_then(|()| shapes.iter().try_for_each(|s| self.fetch(s))) {
             self.lifecycle.abandon();

@@ -11,7 +11,7 @@ use thiserror::Error;
 use volact_core::{ActionError, select::SOFTWARE};
 use volact_shaders::gpu::scene::cuts_loops;
 
-use crate::check::NAME;
+use crate::{check::NAME, pipeline::STORAGE};
 
 const VALIDATION: &CStr = c"VK_LAYER_KHRONOS_validation";
 
@@ -356,6 +356,9 @@ impl Adapter {
         }
         if self.features.fragment_stores_and_atomics == vk::FALSE {
             return Some("no stores from fragment stages");
+        }
+        if (self.properties.limits.max_per_stage_descriptor_storage_buffers as usize) < STORAGE.len() {
+            return Some("too few storage buffers a stage");
         }
         self.family(vk::QueueFlags::GRAPHICS).is_none().then_some("no queue for graphics")
     }

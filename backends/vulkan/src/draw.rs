@@ -3,9 +3,13 @@
 use std::sync::Arc;
 
 use ash::vk;
-use volact_core::{ActionError, Compositing, FrameDesc, Viewport, Volume, frame::Rebuild, mutated, slicing::Step};
+use volact_core::{
+    ActionError, Compositing, FrameDesc, Viewport, Volume, frame::Rebuild, mutated, resolve::ResolvedShape,
+    slicing::Step,
+};
 use volact_shaders::gpu::{
     Layout, MOST_ROWS, Recipe, compose_slices,
+    mesh::Meshes,
     pack::Row,
     runs::{Corner, Polygon, Sliced, Upward, border, corners},
     scene::{self, Item, Key, Limited, Seen},
@@ -33,9 +37,12 @@ pub struct Drawing {
     cache: Cache,
     /// Volumes on the device.
     pub volumes: Volumes,
+    /// Meshes, packed.
+    pub meshes: Meshes,
     frame: Rows,
     numbers: Rows,
     tables: Rows,
+    mesh_rows: Rows,
     limits: Rows,
     limit_rows: Vec<Row>,
     limited: Option<Limited>,
@@ -73,9 +80,11 @@ impl Drawing {
             pipelines: Vec::new(),
             cache: Cache::new(gpu, settings.cache.clone())?,
             volumes: Volumes::new(gpu)?,
+            meshes: Meshes::default(),
             frame: Rows::new("volact frame", vk::BufferUsageFlags::UNIFORM_BUFFER),
             numbers: Rows::uniform("volact numbers", MOST_ROWS),
             tables: storage("volact tables"),
+            mesh_rows: storage("volact meshes"),
             limits: storage("volact limits"),
             limit_rows: Vec::new(),
             limited: None,
@@ -95,30 +104,34 @@ impl Drawing {
         &mut self,
         gpu: &Arc<Gpu>,
         desc: &FrameDesc,
-        items: Vec<Item<'_>>,
+        (items, surfaces): (Vec<Item<'_>>, &[&ResolvedShape]),
         settings: &Settings,
         rebuilt: &mut Vec<Rebuild>,
     ) -> Result<Drawn, ActionError> {
-        let sliced = Sliced::new(NAME, items, desc, &settings.sampling)?;
+        let sliced = Sliced::new(NAME, (items, &self.meshes), desc, &settings.sampling)?;
         let (items, slicing) = (&sliced.items[..], sliced.slicing(NAME, desc, &settings.sampling)?);
         let groups = sliced.groups(&slicing);
         let step = *slicing.step();
         // Without shapes there is no step, and nothing that needs one.
         let distance = if step.distance > 0.0 { step.distance } else { 1.0 };
-        let seen = Seen::new(desc, items, distance)?;
+        let seen = Seen::new(desc, (items, surfaces), distance)?;
         let held = |volume: &Volume| self.volumes.held(volume);
         let recipes: Vec<Recipe> = items.iter().map(|i| i.recipe(settings.hardware, held)).collect();
         let sweeps = groups.iter().any(|g| g[1] - g[0] > 1);
-        let (pipeline, layout) = self.pipeline(gpu, (items, &recipes), sweeps, desc, rebuilt)?;
+        let all = (items, &recipes[..], surfaces);
+        let (pipeline, layout) = self.pipeline(gpu, all, sweeps, desc, rebuilt)?;
+        let mut uploaded = self.set_meshes(gpu)?;
         let held = |volume: &Volume| self.volumes.held(volume);
-        let (numbers, tables) = scene::rows((items, &recipes), (&layout, &seen.anchor), &desc.clip, &[], held);
-        let mut uploaded = self.numbers.set(gpu, numbers)?;
+        let how = (&layout, &seen.anchor);
+        let (numbers, tables, numbered) = scene::rows(all, how, &desc.clip, (&[], &self.meshes), held);
+        uploaded += self.numbers.set(gpu, numbers)?;
         if self.tables.buffer().is_none() || !mutated!("stale_table") {
             uploaded += self.tables.set(gpu, tables)?;
         }
         uploaded += self.set_limits(gpu, seen.limited(desc))?;
-        uploaded += self.frame.set(gpu, seen.rows(desc, settings.termination, desc.opaque.is_some()))?;
-        let (vertices, polygons) = corners(&slicing, &groups, border(&seen, distance), Upward::No);
+        uploaded += self.frame.set(gpu, seen.rows(desc, settings.termination, desc.opaque.is_some(), numbered))?;
+        let border = border(&seen, distance);
+        let (vertices, polygons) = corners(&slicing, &groups, border, !surfaces.is_empty(), Upward::No);
         uploaded += self.set_vertices(gpu, &vertices)?;
         self.make_target(gpu, &seen.viewport)?;
         self.bind(items, &pipeline)?;
@@ -135,21 +148,22 @@ impl Drawing {
     /// Bytes on the device besides volumes and pictures.
     pub fn bytes(&self) -> usize {
         let vertices = self.vertices.as_ref().map_or(0, |v| v.size() as usize);
-        self.frame.bytes() + self.numbers.bytes() + self.tables.bytes() + self.limits.bytes() + vertices
+        let rows = [&self.frame, &self.numbers, &self.tables, &self.mesh_rows, &self.limits];
+        rows.map(Rows::bytes).iter().sum::<usize>() + vertices
     }
 
     /// The pipeline of these shapes, compiled once.
     fn pipeline(
         &mut self,
         gpu: &Arc<Gpu>,
-        (items, recipes): (&[Item<'_>], &[Recipe]),
+        (items, recipes, surfaces): (&[Item<'_>], &[Recipe], &[&ResolvedShape]),
         together: bool,
         desc: &FrameDesc,
         rebuilt: &mut Vec<Rebuild>,
     ) -> Result<(Arc<Pipeline>, Layout), ActionError> {
-        let key = Key::new(NAME, items, recipes, &desc.clip)?;
-        let surfaces = items.iter().any(|i| i.program.compositing() == Compositing::First);
-        let sweeps = together || surfaces || key.planes;
+        let key = Key::new(NAME, (items, surfaces), recipes, &desc.clip)?;
+        let crossings = items.iter().any(|i| i.program.compositing() == Compositing::First);
+        let sweeps = together || crossings || key.planes;
         let key = (key, sweeps);
         if let Some((_, pipeline, layout)) = self.pipelines.iter().find(|(k, ..)| *k == key) {
             return Ok((Arc::clone(pipeline), layout.clone()));
@@ -161,7 +175,8 @@ impl Drawing {
             let wanted = format!("at most {most} on adapter {:?}; draw fewer in a frame", gpu.name());
             return Err(limit("number of volumes".into(), images.to_string(), wanted));
         }
-        let composition = compose_slices(recipes, key.0.spans, (sweeps, false), gpu.cuts_loops());
+        let has = (key.0.planes, key.0.surfaces);
+        let composition = compose_slices(recipes, key.0.spans, has, (sweeps, false), gpu.cuts_loops());
         let composition = composition.map_err(|e| backend(Box::new(e)))?;
         let pipeline = Pipeline::new(gpu, &composition, &self.cache).map_err(|e| backend(Box::new(e)))?;
         let (pipeline, layout) = (Arc::new(pipeline), composition.layout);
@@ -176,6 +191,16 @@ impl Drawing {
         }
         self.pipelines.push((key, Arc::clone(&pipeline), layout.clone()));
         Ok((pipeline, layout))
+    }
+
+    /// The rows of meshes, where they have changed.
+    fn set_meshes(&mut self, gpu: &Arc<Gpu>) -> Result<usize, ActionError> {
+        let Some(rows) = self.meshes.rows() else { return Ok(0) };
+        let set = self.mesh_rows.set(gpu, rows);
+        if set.is_err() {
+            self.meshes.forget();
+        }
+        set
     }
 
     /// What the application has drawn, where it has changed.
@@ -221,16 +246,18 @@ impl Drawing {
     /// Binds anew where anything that is bound is another.
     fn bind(&mut self, items: &[Item<'_>], pipeline: &Arc<Pipeline>) -> Result<(), ActionError> {
         let volumes: Vec<_> = items.iter().flat_map(Item::volumes).filter_map(|v| self.volumes.get(v)).collect();
-        let rows = [&self.frame, &self.numbers, &self.tables, &self.limits];
+        let rows = [&self.frame, &self.numbers, &self.tables, &self.limits, &self.mesh_rows];
         let Some(target) = &self.target else { return Ok(()) };
         let mut made_of = vec![Arc::as_ptr(pipeline) as u64, target.generation];
         made_of.extend(rows.iter().map(|r| r.generation).chain(volumes.iter().map(|v| v.generation)));
         if self.bound.as_ref().is_some_and(|(b, _)| *b == made_of) {
             return Ok(());
         }
-        let [Some(frame), Some(numbers), Some(tables), Some(limits)] = rows.map(Rows::buffer) else { return Ok(()) };
+        let [Some(frame), Some(numbers), Some(tables), Some(limits), Some(meshes)] = rows.map(Rows::buffer) else {
+            return Ok(());
+        };
         let images: Vec<_> = volumes.iter().map(|v| &v.image).collect();
-        let buffers = [frame, numbers, tables, limits, &target.light, &target.flags];
+        let buffers = [frame, numbers, tables, limits, &target.light, &target.flags, meshes];
         self.bound = Some((made_of, pipeline.bind(buffers, &self.sampler, &images)?));
         Ok(())
     }

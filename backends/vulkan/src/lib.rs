@@ -14,12 +14,14 @@
 //! |---|---|
 //! | a managed volume | a sampled 3D image, filled by the transfer queue where there is one |
 //! | a shader | SPIR-V from naga, in a graphics pipeline of dynamic rendering without attachments |
+//! | a mesh | rows of a storage buffer; its slabs are those of the box around it |
 //! | a run of slabs | a render pass of one polygon, and a barrier on the light |
 //! | a frame | one submission, waited for through a timeline semaphore |
 //!
 //! # Known gaps
-//! Refused by name, see [`check`]: geometries other than blocks, pre-interpolated tables, and what is no number in a
-//! volume where the format has nothing for it.
+//! Refused by name, see [`check`]: volumes that meshes carry by texture coordinates, pre-interpolated tables of shaders other
+//! than `lut`, and what is no number in a volume where the format has nothing for it; and, once they are seen, meshes whose
+//! cells carry numbers and overlap.
 //!
 //! # Unsafe code
 //! Calls of Vulkan are unsafe. They are in `device` (instance, adapter, device), `memory` (buffers and

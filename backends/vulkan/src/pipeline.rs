@@ -16,7 +16,7 @@ use crate::{
 pub const CORNER: u32 = 28;
 
 /// Bindings of group 0 that shaders see as storage buffers.
-const STORAGE: [u32; 4] = [2, 3, 4, 6];
+pub const STORAGE: [u32; 5] = [2, 3, 4, 6, 8];
 
 /// Why a module has no pipeline.
 #[derive(Debug, Error)]
@@ -198,7 +198,7 @@ impl Pipeline {
     ///
     /// # Errors
     /// If the device gives no more.
-    pub fn bind(&self, buffers: [&Buffer; 6], sampler: &Sampler, images: &[&Image]) -> Result<Bound, DeviceError> {
+    pub fn bind(&self, buffers: [&Buffer; 7], sampler: &Sampler, images: &[&Image]) -> Result<Bound, DeviceError> {
         let gpu = &self.gpu;
         let bindings = frame_bindings().into_iter().chain(volume_bindings(self.textures));
         let size = |(_, ty)| vk::DescriptorPoolSize { ty, descriptor_count: 1 };
@@ -216,7 +216,7 @@ impl Pipeline {
         Ok(bound)
     }
 
-    fn write(&self, sets: &[vk::DescriptorSet], buffers: [&Buffer; 6], sampler: &Sampler, images: &[&Image]) {
+    fn write(&self, sets: &[vk::DescriptorSet], buffers: [&Buffer; 7], sampler: &Sampler, images: &[&Image]) {
         let buffer = |b: &&Buffer| [vk::DescriptorBufferInfo { buffer: b.raw(), offset: 0, range: vk::WHOLE_SIZE }];
         let buffers: Vec<_> = buffers.iter().map(buffer).collect();
         let sampler = [vk::DescriptorImageInfo { sampler: sampler.raw, ..Default::default() }];

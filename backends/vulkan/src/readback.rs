@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use ash::vk;
 use volact_core::{ActionError, Frame, Viewport, mutated};
-use volact_shaders::gpu::{CUT_FLAG, FLAGS, pack::Row};
+use volact_shaders::gpu::{CUT_FLAG, FLAGS, OVERLAP_FLAG, pack::Row};
 
 use crate::{
     device::Gpu,
@@ -39,6 +39,8 @@ pub struct Target {
 pub struct Counts {
     /// The shape whose loop overran its budget.
     pub overrun: Option<usize>,
+    /// The shape whose cells carry numbers and overlap.
+    pub overlapping: Option<usize>,
     /// Whether the device has cut a loop short.
     pub cut: bool,
     /// Samples.
@@ -100,8 +102,9 @@ impl Target {
         let word = |i: usize| bytes.get(4 * i..4 * i + 4).and_then(|b| b.try_into().ok()).map_or(0, u32::from_ne_bytes);
         let four = |i: usize| [0, 1, 2, 3].map(|c| f32::from_bits(word(4 * i + c)));
         let flag = |i: usize| word(8 * count + i);
-        let (overrun, cut) = ((flag(0) as usize).checked_sub(1), flag(CUT_FLAG) != 0);
-        let mut counts = Counts { overrun, cut, ..Counts::default() };
+        let shape = |i: usize| (flag(i) as usize).checked_sub(1);
+        let (overrun, overlapping, cut) = (shape(0), shape(OVERLAP_FLAG), flag(CUT_FLAG) != 0);
+        let mut counts = Counts { overrun, overlapping, cut, ..Counts::default() };
         for i in 0..count {
             let mut color = four(2 * i);
             let [mut left, mut depth, state, samples] = four(2 * i + 1);

@@ -8,7 +8,10 @@ use volact_core::{
 };
 use volact_shaders::{
     Programs,
-    gpu::scene::{Item, cut_short, overrun},
+    gpu::{
+        mesh::surface::is_surface,
+        scene::{Item, cut_short, overlapping, overrun},
+    },
 };
 
 use crate::{
@@ -89,12 +92,16 @@ impl WgpuAction {
 
     fn prepare(&mut self, shapes: &[ResolvedShape], started: &mut Started) -> Result<(), ActionError> {
         self.drawing.volumes.retain(shapes.iter());
+        self.drawing.meshes.retain(shapes.iter());
         for shape in shapes {
+            if let Some(bytes) = self.drawing.meshes.prepare(NAME, shape)? {
+                started.rebuilt.push(Rebuild { shape: shape.name.clone(), what: "mesh".into(), bytes });
+            }
             let volumes = &mut self.drawing.volumes;
             started.uploaded += volumes.prepare(&self.gpu, shape, &self.settings, &mut started.rebuilt)?;
         }
         if self.settings.sample_distance.is_some() {
-            plan::step(&shapes.iter().collect::<Vec<_>>(), &self.settings)?;
+            plan::step(&shapes.iter().filter(|s| !is_surface(s)).collect::<Vec<_>>(), &self.settings)?;
         }
         Ok(())
     }
@@ -113,10 +120,11 @@ impl WgpuAction {
             return Err(ActionError::NotDrawing { call: "end_draw" });
         };
         let drawn: Vec<&ResolvedShape> = open.drawn_shapes().collect();
+        let (surfaces, solid): (Vec<_>, Vec<_>) = drawn.iter().copied().partition(|s| is_surface(s));
         let item = |shape| Ok(Item { shape, program: self.programs.of(shape)? });
-        let items = drawn.iter().copied().map(item).collect::<Result<Vec<_>, ActionError>>()?;
+        let items = solid.into_iter().map(item).collect::<Result<Vec<_>, ActionError>>()?;
         let how = (&self.settings, onto);
-        let submitted = self.drawing.submit(&self.gpu, &open.desc, items, how, &mut rebuilt)?;
+        let submitted = self.drawing.submit(&self.gpu, &open.desc, (items, &surfaces), how, &mut rebuilt)?;
         uploaded += submitted.uploaded;
         let prepare = at.elapsed();
         let mut frame = Frame::empty(&open.desc);
@@ -129,6 +137,9 @@ impl WgpuAction {
         };
         if let Some(number) = counts.overrun {
             return Err(overrun(submitted.order.get(number), &drawn, self.gpu.cuts_loops()));
+        }
+        if let Some(number) = counts.overlapping {
+            return Err(overlapping(NAME, submitted.order.get(number)));
         }
         if counts.cut {
             return Err(cut_short(NAME, self.gpu.name(), submitted.step));
@@ -182,7 +193,7 @@ impl RenderAction for WgpuAction {
 
     fn manage(&mut self, shape: &Shape) -> Result<(), ActionError> {
         let programs = &self.programs;
-        self.lifecycle.manage(shape, |shape| programs.of(shape).and_then(|_| check(shape)))?;
+        self.lifecycle.manage(shape, |shape| check(shape, programs))?;
         log::debug!("wgpu: manages {:?}", shape.name());
         Ok(())
     }
@@ -194,7 +205,7 @@ impl RenderAction for WgpuAction {
     fn begin_draw(&mut self, frame: &FrameDesc) -> Result<(), ActionError> {
         let mut started = Started { at: Instant::now(), uploaded: 0, rebuilt: Vec::new() };
         let programs = &self.programs;
-        let open = self.lifecycle.begin(frame, |shape| programs.of(shape).and_then(|_| check(shape)))?;
+        let open = self.lifecycle.begin(frame, |shape| check(shape, programs))?;
         let shapes: Vec<ResolvedShape> = open.shapes.values().cloned().collect();
         let scopes = self.gpu.scopes();
         let prepared = self.prepare(&shapes, &mut started);

@@ -1,7 +1,10 @@
 //! What `wgpu` draws, and the errors for what it does not.
 
-use volact_core::{ActionError, Caps, Compositing, ParameterValue, TableInterpolation, resolve::ResolvedShape};
-use volact_shaders::{blunt, unfit};
+use volact_core::{ActionError, Caps, Compositing, resolve::ResolvedShape};
+use volact_shaders::{
+    Programs,
+    gpu::{mesh::surface, scene},
+};
 
 /// The action's name.
 pub const NAME: &str = "wgpu";
@@ -10,9 +13,9 @@ pub const NAME: &str = "wgpu";
 pub fn caps(device: &str) -> Caps {
     let builtin = volact_shaders::builtin().unwrap_or_default();
     Caps {
-        shaders: Some(builtin.into_iter().map(|s| s.declaration.name).filter(|n| n != "attribute").collect()),
+        shaders: Some(builtin.into_iter().map(|s| s.declaration.name).chain(["surface".into()]).collect()),
         sources: true,
-        geometries: Some(vec!["block".into()]),
+        geometries: None,
         compositing: Compositing::ALL.to_vec(),
         overlap: true,
         depth: true,
@@ -23,37 +26,16 @@ pub fn caps(device: &str) -> Caps {
 /// Refuses what cannot be drawn.
 ///
 /// # Errors
-/// [`ActionError::Unsupported`], by name and with a cure.
-pub fn check(shape: &ResolvedShape) -> Result<(), ActionError> {
-    match refused(shape) {
+/// [`ActionError::Unsupported`], by name and with a cure, or what is wrong with the shader.
+pub fn check(shape: &ResolvedShape, programs: &Programs) -> Result<(), ActionError> {
+    if surface::is_surface(shape) {
+        return surface::check(NAME, shape);
+    }
+    programs.of(shape)?;
+    match scene::unfit(shape) {
         None => Ok(()),
         Some((what, cure)) => {
             Err(ActionError::Unsupported { action: NAME.into(), shape: shape.name.clone(), what, cure })
         }
     }
-}
-
-fn refused(shape: &ResolvedShape) -> Option<(String, String)> {
-    let geometry = &shape.state.geometry;
-    if geometry.as_block().is_none() {
-        return Some((
-            format!("geometry {:?}", geometry.name()),
-            "draw it with the action cpu, or take a block".into(),
-        ));
-    }
-    for (parameter, value) in &shape.parameters {
-        match value {
-            ParameterValue::Table(t) if t.interpolation() == TableInterpolation::Pre => {
-                return Some((
-                    format!("the pre-interpolated table {parameter:?}"),
-                    "let it apply after interpolation, or draw with the action cpu".into(),
-                ));
-            }
-            ParameterValue::Attribute(_) => {
-                return Some((format!("the attribute {parameter:?}"), "draw it with the action cpu".into()));
-            }
-            _ => {}
-        }
-    }
-    unfit(shape).or_else(|| blunt(shape))
 }

@@ -2,9 +2,12 @@
 
 use std::sync::Arc;
 
-use volact_core::{ActionError, FrameDesc, Viewport, Volume, frame::Rebuild, mutated, slicing::Step};
+use volact_core::{
+    ActionError, FrameDesc, Viewport, Volume, frame::Rebuild, mutated, resolve::ResolvedShape, slicing::Step,
+};
 use volact_shaders::gpu::{
     Anchor, FrameNumbers, MOST_ROWS, Recipe, WORKGROUP,
+    mesh::Meshes,
     pack::Row,
     scene::{self, Item, Key, Limited, Seen},
     skip::Cells,
@@ -30,9 +33,12 @@ pub struct Drawing {
     pipelines: Pipelines,
     /// Volumes on the device.
     pub volumes: Volumes,
+    /// Meshes, packed.
+    pub meshes: Meshes,
     frame: Rows,
     numbers: Rows,
     tables: Rows,
+    mesh_rows: Rows,
     limits: Rows,
     limited: Option<Limited>,
     skipping: Skipping,
@@ -75,9 +81,11 @@ impl Default for Drawing {
         Self {
             pipelines: Pipelines::default(),
             volumes: Volumes::default(),
+            meshes: Meshes::default(),
             frame: Rows::uniform("volact frame", size_of::<FrameNumbers>() / size_of::<Row>()),
             numbers: Rows::uniform("volact numbers", MOST_ROWS),
             tables: Rows::storage("volact tables"),
+            mesh_rows: Rows::storage("volact meshes"),
             limits: Rows::storage("volact limits"),
             limited: None,
             skipping: Skipping::default(),
@@ -100,16 +108,17 @@ impl Drawing {
         &mut self,
         gpu: &Gpu,
         desc: &FrameDesc,
-        items: Vec<Item<'_>>,
+        (items, surfaces): (Vec<Item<'_>>, &[&ResolvedShape]),
         (settings, onto): (&Settings, Option<&Onto<'_>>),
         rebuilt: &mut Vec<Rebuild>,
     ) -> Result<Drawn, ActionError> {
-        let planned = Planned::new(desc, items, settings)?;
+        let mut uploaded = self.set_meshes(gpu)?;
+        let planned = Planned::new(desc, (items, &self.meshes), settings)?;
         let (items, lattice) = (planned.items(), planned.lattice(desc, settings)?);
-        let seen = Seen::new(desc, items, lattice.step)?;
+        let seen = Seen::new(desc, (items, surfaces), lattice.step)?;
         let held = |volume: &Volume| self.volumes.held(volume);
         let recipes: Vec<Recipe> = items.iter().map(|i| i.recipe(settings.hardware, held)).collect();
-        let key = (Key::new(NAME, items, &recipes, &desc.clip)?, lattice.stage(items));
+        let key = (Key::new(NAME, (items, surfaces), &recipes, &desc.clip)?, lattice.stage(items));
         let (pipeline, anew) = self.pipelines.get(gpu, key, &recipes)?;
         if anew {
             rebuilt.push(Rebuild { shape: NAME.into(), what: "pipeline".into(), bytes: 0 });
@@ -117,8 +126,9 @@ impl Drawing {
         let pairs: Vec<_> = items.iter().map(|i| (i.shape, &i.program)).collect();
         let cells = if settings.skipping { self.skipping.cells(&pairs) } else { vec![None; items.len()] };
         let how = (&pipeline.layout, &seen.anchor);
-        let (numbers, tables) = scene::rows((items, &recipes), how, &desc.clip, &cells, held);
-        let mut uploaded = self.numbers.set(gpu, numbers)?;
+        let all = (items, &recipes[..], surfaces);
+        let (numbers, tables, numbered) = scene::rows(all, how, &desc.clip, (&cells, &self.meshes), held);
+        uploaded += self.numbers.set(gpu, numbers)?;
         if self.tables.buffer().is_none() || !mutated!("stale_table") {
             uploaded += self.tables.set(gpu, tables)?;
         }
@@ -127,12 +137,12 @@ impl Drawing {
             Some(_) => self.reserve_limits(gpu, &seen.viewport)?,
             None => uploaded += self.upload_limits(gpu, seen.limited(desc))?,
         }
-        let rows = seen.rows(desc, settings.termination, desc.opaque.is_some() || depth.is_some());
+        let rows = seen.rows(desc, settings.termination, desc.opaque.is_some() || depth.is_some(), numbered);
         uploaded += self.frame.set(gpu, rows.clone())?;
         let bounds = Bounds { samples: settings.submission, pixels: usize::MAX };
         let height = bands::height(&seen.viewport, plan::samples(items, lattice.step), &bounds);
         self.make_target(gpu, &seen.viewport, height)?;
-        if let Some((corners, polygons)) = lattice.corners(&seen) {
+        if let Some((corners, polygons)) = lattice.corners(&seen, !surfaces.is_empty()) {
             uploaded += self.slabs.set(gpu, corners, polygons)?;
             self.slabs.reserve(gpu, height * seen.viewport.width, &seen.viewport)?;
         }
@@ -153,7 +163,7 @@ impl Drawing {
 
     /// Bytes on the device besides volumes and pictures.
     pub fn bytes(&self) -> usize {
-        let rows = [&self.frame, &self.numbers, &self.tables, &self.limits].map(Rows::bytes);
+        let rows = [&self.frame, &self.numbers, &self.tables, &self.mesh_rows, &self.limits].map(Rows::bytes);
         rows.iter().sum::<usize>() + self.skipping.bytes() + self.slabs.bytes()
     }
 
@@ -170,6 +180,16 @@ impl Drawing {
         let items: Vec<_> = items.iter().zip(cells).map(|(i, cells)| (i.shape, &i.program, *cells)).collect();
         let there = (&self.volumes, &pipeline.layout, [frame, numbers, tables]);
         self.skipping.find(gpu, &items, there, rebuilt)
+    }
+
+    /// The rows of meshes, where they have changed.
+    fn set_meshes(&mut self, gpu: &Gpu) -> Result<usize, ActionError> {
+        let Some(rows) = self.meshes.rows() else { return Ok(0) };
+        let set = self.mesh_rows.set(gpu, rows);
+        if set.is_err() {
+            self.meshes.forget();
+        }
+        set
     }
 
     /// What the application has drawn, where it has changed.
@@ -208,9 +228,10 @@ impl Drawing {
         let Some(target) = &self.target else { return Ok(()) };
         let volumes: Vec<_> = items.iter().flat_map(Item::volumes).filter_map(|v| self.volumes.get(v)).collect();
         let rows = [&self.frame, &self.numbers, &self.tables, &self.limits];
-        let Some(empties) = self.skipping.held() else { return Ok(()) };
+        let (Some(empties), Some(meshes)) = (self.skipping.held(), self.mesh_rows.buffer()) else { return Ok(()) };
         let generations = [pipeline.generation, target.generation, self.skipping.generation, self.slabs.generation];
         let mut made_of = generations.to_vec();
+        made_of.push(self.mesh_rows.generation);
         made_of.extend(rows.iter().map(|r| r.generation).chain(volumes.iter().map(|v| v.generation)));
         if self.bound.as_ref().is_some_and(|b| b.made_of == made_of) {
             return Ok(());
@@ -225,7 +246,7 @@ impl Drawing {
         });
         let frame = |picture| {
             let buffers = rows.iter().filter_map(|r| r.buffer());
-            let buffers = buffers.chain([picture, &target.depths, &target.flags, empties]);
+            let buffers = buffers.chain([picture, &target.depths, &target.flags, empties, meshes]);
             buffers.map(wgpu::Buffer::as_entire_binding).collect::<Vec<_>>()
         };
         let slabs = matches!(pipeline.stages, Stages::Slabs(_));

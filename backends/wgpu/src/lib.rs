@@ -6,6 +6,7 @@
 //! | volume | a 3D texture of the whole data, one for all shapes that show it ([`resources`]) |
 //! | lookup table | rows of a storage buffer, control points at any places, found by buckets |
 //! | shader | the author's functions merged into one module ([`volact_shaders::gpu`], [`pipeline`]) |
+//! | mesh | rows of one storage buffer: the boundary's faces under a tree, cells where they carry numbers |
 //! | frame | a submission for each band of rows ([`bands`]), of one invocation a pixel, summed in f32 registers ([`draw`], [`readback`]), or of runs of slabs ([`slabs`]) |
 //!
 //! Everything that a frame needs is kept and compared with what is there at `begin_draw`: voxels by
@@ -27,7 +28,8 @@
 //! lose digits. Interpolation has exact weights unless the option `filter` says `hardware`.
 //!
 //! # Known gaps
-//! Meshes, surfaces, attributes and pre-interpolated tables are refused by name. A submission is bounded by how many
+//! Volumes that meshes carry by texture coordinates, and pre-interpolated tables of shaders other than `lut`, are refused by
+//! name; so are, once they are seen, meshes whose cells carry numbers and overlap. A submission is bounded by how many
 //! samples it takes ([`bands`]), not by how long they take.
 
 mod action;

@@ -75,10 +75,10 @@ impl Pipelines {
 
 fn make(gpu: &Gpu, (key, stage): &Known, recipes: &[Recipe], generation: u64) -> Result<Pipeline, ActionError> {
     let wrong = |error: ComposeError| ActionError::Backend { action: NAME.into(), source: Box::new(error) };
-    let watched = gpu.cuts_loops();
+    let (watched, has) = (gpu.cuts_loops(), (key.planes, key.surfaces));
     let made = match stage {
-        Stage::Rays => compose(recipes, key.spans, key.planes, watched),
-        Stage::Slabs { together } => compose_slices(recipes, key.spans, (key.planes || *together, true), watched),
+        Stage::Rays => compose(recipes, key.spans, has, watched),
+        Stage::Slabs { together } => compose_slices(recipes, key.spans, has, (key.planes || *together, true), watched),
     };
     let made = made.map_err(wrong)?;
     check(gpu, &made.layout, *stage)?;
@@ -190,7 +190,7 @@ fn check(gpu: &Gpu, layout: &Layout, stage: Stage) -> Result<(), ActionError> {
 }
 
 /// Storage buffers of group 0.
-const BUFFERS: u32 = 6;
+const BUFFERS: u32 = 7;
 
 /// A binding of a compute stage.
 pub fn entry(binding: u32, ty: wgpu::BindingType) -> wgpu::BindGroupLayoutEntry {
@@ -213,6 +213,7 @@ pub fn frame_group(device: &wgpu::Device, seen: wgpu::ShaderStages) -> wgpu::Bin
             entry(5, storage(false)),
             entry(6, storage(false)),
             entry(7, storage(true)),
+            entry(8, storage(true)),
         ],
     })
 }

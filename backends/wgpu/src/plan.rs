@@ -8,6 +8,7 @@ use volact_core::{
 };
 use volact_shaders::gpu::{
     is_deep,
+    mesh::Meshes,
     runs::{Corner, Polygon, Sliced, Upward, border, corners},
     scene::{Item, Seen},
 };
@@ -66,13 +67,17 @@ pub struct Lattice<'a> {
 }
 
 impl<'a> Planned<'a> {
-    /// Decides for the shapes of a frame.
+    /// Decides for the shapes of a frame, whose meshes are packed.
     ///
     /// # Errors
     /// If the step is too small, or there are no slices of them.
-    pub fn new(desc: &FrameDesc, mut items: Vec<Item<'a>>, settings: &Settings) -> Result<Self, ActionError> {
+    pub fn new(
+        desc: &FrameDesc,
+        (mut items, meshes): (Vec<Item<'a>>, &Meshes),
+        settings: &Settings,
+    ) -> Result<Self, ActionError> {
         if settings.means == Means::Slices {
-            return Ok(Self::Slices(Sliced::new(NAME, items, desc, &settings.sampling())?));
+            return Ok(Self::Slices(Sliced::new(NAME, (items, meshes), desc, &settings.sampling())?));
         }
         let step = step(&items.iter().map(|i| i.shape).collect::<Vec<_>>(), settings)?;
         // Those composited in depth come first, in an order that does not depend on that of drawing.
@@ -109,17 +114,17 @@ impl<'a> Planned<'a> {
 impl Lattice<'_> {
     /// The stage that draws these shapes.
     pub fn stage(&self, items: &[Item<'_>]) -> Stage {
-        let surfaces = || items.iter().any(|i| i.program.compositing() == Compositing::First);
+        let crossings = || items.iter().any(|i| i.program.compositing() == Compositing::First);
         match &self.slabs {
             None => Stage::Rays,
-            Some((_, groups)) => Stage::Slabs { together: groups.iter().any(|g| g[1] - g[0] > 1) || surfaces() },
+            Some((_, groups)) => Stage::Slabs { together: groups.iter().any(|g| g[1] - g[0] > 1) || crossings() },
         }
     }
 
-    /// The polygons of slabs.
-    pub fn corners(&self, seen: &Seen) -> Option<(Vec<Corner>, Vec<Polygon>)> {
+    /// The polygons of slabs, and where there are `surfaces`, of these.
+    pub fn corners(&self, seen: &Seen, surfaces: bool) -> Option<(Vec<Corner>, Vec<Polygon>)> {
         let (slicing, groups) = self.slabs.as_ref()?;
-        Some(corners(slicing, groups, border(seen, self.step), Upward::Yes))
+        Some(corners(slicing, groups, border(seen, self.step), surfaces, Upward::Yes))
     }
 }
 

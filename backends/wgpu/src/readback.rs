@@ -1,7 +1,7 @@
 //! From the device's pixels to a frame.
 
 use volact_core::{Frame, Viewport};
-use volact_shaders::gpu::{COUNTERS, CUT_FLAG, FLAGS};
+use volact_shaders::gpu::{COUNTERS, CUT_FLAG, FLAGS, OVERLAP_FLAG};
 
 use crate::{
     bands::Band,
@@ -67,6 +67,8 @@ struct Timer {
 pub struct Counts {
     /// The shape whose loop overran its budget.
     pub overrun: Option<usize>,
+    /// The shape whose cells carry numbers and overlap.
+    pub overlapping: Option<usize>,
     /// Whether the device has cut a loop short.
     pub cut: bool,
     /// Samples.
@@ -208,6 +210,7 @@ impl Target {
         let seconds = |timer: &Timer| tick(1).saturating_sub(tick(0)) as f64 * timer.period * 1e-9;
         Counts {
             overrun: (word(0) as usize).checked_sub(1),
+            overlapping: (word(OVERLAP_FLAG) as usize).checked_sub(1),
             cut: word(CUT_FLAG) != 0,
             samples: sum(1),
             rays: sum(1 + COUNTERS),

@@ -29,6 +29,16 @@ const TABLE: &str = include_str!("../../wgsl/gpu/table.wgsl");
 const NUMBER: &str = include_str!("../../wgsl/gpu/number.wgsl");
 const GIVEN: &str = include_str!("../../wgsl/gpu/given.wgsl");
 pub(super) const RAY: &str = include_str!("../../wgsl/gpu/ray.wgsl");
+const BLOCKS: &str = include_str!("../../wgsl/gpu/blocks.wgsl");
+const MESHES: &str = include_str!("../../wgsl/gpu/meshes.wgsl");
+const UNCARRIED: &str = include_str!("../../wgsl/gpu/uncarried.wgsl");
+const SURFACES: &str = include_str!("../../wgsl/gpu/surfaces.wgsl");
+const NO_SURFACES: &str = include_str!("../../wgsl/gpu/no_surfaces.wgsl");
+const PRE: &str = include_str!("../../wgsl/gpu/pre.wgsl");
+const CELLS: &str = include_str!("../../wgsl/gpu/cells.wgsl");
+const VERTICES: &str = include_str!("../../wgsl/gpu/vertices.wgsl");
+/// Stretches of a ray in a mesh that are kept at a time, besides one (`VOLACT_STRETCHES`).
+const STRETCHES: u32 = 3;
 const AHEAD: &str = include_str!("../../wgsl/gpu/ahead.wgsl");
 const UNKNOWN: &str = include_str!("../../wgsl/gpu/unknown.wgsl");
 /// The parts of the stage that casts rays.
@@ -68,14 +78,19 @@ pub struct Composition {
 
 /// Composes the ray-casting stage for shapes: first those that are composited in depth, then those
 /// that are a picture each, in the order in which they are laid over. `spans` is the number of
-/// stretches that clips may leave of a ray; `planes` tells that a shape may have slice planes. A device
-/// that cuts loops short is `watched`: that it did is then in the flags, and authors' loops have half of
+/// stretches that clips may leave of a ray; `planes` and `surfaces` tell that a shape may have slice planes,
+/// and that there are surfaces. A device that cuts loops short is `watched`: that it did is then in the flags, and authors' loops have half of
 /// their budget so that the two are told apart.
 ///
 /// # Errors
 /// If something cannot be put together, which would be a fault of this crate.
-pub fn compose(recipes: &[Recipe], spans: u32, planes: bool, watched: bool) -> Result<Composition, ComposeError> {
-    stage(recipes, spans, (planes, watched), "", &RAYS)
+pub fn compose(
+    recipes: &[Recipe],
+    spans: u32,
+    (planes, surfaces): (bool, bool),
+    watched: bool,
+) -> Result<Composition, ComposeError> {
+    stage(recipes, spans, (planes, surfaces, watched), "", &RAYS)
 }
 
 /// Composes the stages that draw slabs of shapes, in the order of [`compose`]: a vertex stage
@@ -87,11 +102,12 @@ pub fn compose(recipes: &[Recipe], spans: u32, planes: bool, watched: bool) -> R
 pub fn compose_slices(
     recipes: &[Recipe],
     spans: u32,
+    has: (bool, bool),
     (sweeps, skips): (bool, bool),
     watched: bool,
 ) -> Result<Composition, ComposeError> {
     let texts = [&[if skips { AHEAD } else { UNKNOWN }], &SLICES[..]].concat();
-    stage(recipes, spans, (true, watched), &format!("const ALONES: bool = {};\n", !sweeps), &texts)
+    stage(recipes, spans, (has.0, has.1, watched), &format!("const ALONES: bool = {};\n", !sweeps), &texts)
 }
 
 /// The module of the entry point `volact_finish`, which makes pixels, depths and counts of the light that
@@ -108,7 +124,7 @@ pub fn finish() -> Result<(Module, ModuleInfo), ComposeError> {
 fn stage(
     recipes: &[Recipe],
     spans: u32,
-    (planes, watched): (bool, bool),
+    (planes, surfaces, watched): (bool, bool, bool),
     more: &str,
     texts: &[&str],
 ) -> Result<Composition, ComposeError> {
@@ -119,13 +135,23 @@ fn stage(
     let kinds: Vec<Compositing> = recipes.iter().map(|r| r.program.compositing()).collect();
     let deep = kinds.iter().take_while(|c| is_deep(**c)).count();
     let alone = deep == 1 && kinds[0] == Compositing::Over && !planes;
+    let meshes = recipes.iter().any(|r| r.mesh);
+    let crosses = kinds.contains(&Compositing::First);
     let constants = format!(
-        "const SHAPES: u32 = {}u;\nconst DEEP: u32 = {deep}u;\nconst TRACKS: u32 = {}u;\nconst SPANS: u32 = {spans}u;\n\
-         const ALONE: bool = {alone};\n{more}",
+        "const SHAPES: u32 = {}u;\nconst DEEP: u32 = {deep}u;\nconst TRACKS: u32 = {}u;\nconst SPANS: u32 = {}u;\n\
+         const MESHES: bool = {meshes};\nconst ALONE: bool = {alone};\nconst PLANES: bool = {planes};\n\
+         const CROSSES: bool = {crosses};\n{more}",
         recipes.len(),
         deep.max(1),
+        spans + if meshes { STRETCHES } else { 0 },
     );
-    let stage = parse(&constants, &[&[HOOKS], texts].concat())?;
+    let inside: &[&str] = match (meshes || surfaces, recipes.iter().any(|r| r.carries)) {
+        (false, _) => &[BLOCKS],
+        (true, false) => &[MESHES, UNCARRIED],
+        (true, true) => &[MESHES, CELLS],
+    };
+    let ends = if surfaces { SURFACES } else { NO_SURFACES };
+    let stage = parse(&constants, &[&[HOOKS, ends], inside, texts].concat())?;
     let watch = if watched { Some(merger.shared("volact_short")?) } else { None };
     let mut import = Import::new(&stage, "");
     import.watch(watch);
@@ -133,9 +159,15 @@ fn stage(
     for (number, recipe) in recipes.iter().enumerate() {
         shapes.push(Shape::import(&mut merger, recipe, (number, watch), &layout.slots[number])?);
     }
-    for (hook, entry) in [("volact_shade", Entry::Shade), ("volact_value_of", Entry::Value)] {
+    for (hook, entry, who) in HOOKED {
         let budget = if watched { LOOP_BUDGET / 2 } else { LOOP_BUDGET };
-        let function = dispatch(&mut merger, &mut import, (&stage, hook), (entry, budget), &shapes)?;
+        let function = dispatch(
+            &mut merger,
+            &mut import,
+            (&stage, hook),
+            (entry, budget),
+            (&shapes, &|i: usize| who(kinds[i], planes)),
+        )?;
         let handle = named(&stage, hook).ok_or_else(|| ComposeError::inner(format!("no hook {hook}")))?;
         let made = merger.module.functions.append(function, Span::UNDEFINED);
         import.substitute(handle, made);
@@ -171,6 +203,8 @@ pub(super) fn parse(constants: &str, texts: &[&str]) -> Result<Module, ComposeEr
 struct Shape {
     entries: Vec<(Entry, Handle<Function>)>,
     sample: Option<Handle<Type>>,
+    /// What gives the members of its samples behind those that all have.
+    numbers: Vec<Handle<Function>>,
 }
 
 impl Shape {
@@ -200,6 +234,7 @@ impl Shape {
                     None => (String::new(), vec![ABSENT]),
                 },
                 Some(ParameterType::Table) => (medium(slot.row), vec![TABLE]),
+                Some(ParameterType::Attribute) => (format!("const ROW: u32 = {}u;\n", slot.row), vec![VERTICES]),
                 _ => (format!("const ROW: u32 = {}u;\n", slot.row), vec![NUMBER]),
             };
             accessors.push(parse(&constants, &texts)?);
@@ -215,6 +250,8 @@ impl Shape {
         for (handle, _) in program.module().functions.iter() {
             let Some(stub) = program.stub(handle) else { continue };
             let (place, name) = match stub {
+                // They read a member of the sample.
+                Stub::Parameter { derived: Derived::Attribute | Derived::AttributeComponents, .. } => continue,
                 Stub::Medium => (2 * parameters.len(), "medium"),
                 Stub::Parameter { parameter, derived: Derived::Given } => (2 * parameter + 1, "volact_given"),
                 Stub::Parameter { parameter, derived } => (2 * parameter, accessor(derived, program.module(), handle)),
@@ -224,6 +261,13 @@ impl Shape {
             let made = merger.function(&mut imports[place], wanted)?;
             import.substitute(handle, made);
         }
+        if let Some([volume, table]) = recipe.pre {
+            let Some(read) = &recipe.volumes[volume] else { return Err(ComposeError::inner("no volume")) };
+            let constants = format!("{}const UNIT: u32 = {unit}u;\n", reading(&slots[volume], read));
+            let source = parse(&constants, &[VOLUME, EXACT, PRE])?;
+            let shade = classified(merger, &source, (&accessors[2 * table], &mut imports[2 * table]), number)?;
+            return Ok(Self { entries: vec![(Entry::Shade, shade)], sample: None, numbers: Vec::new() });
+        }
         let mut entries = Vec::new();
         for entry in [Entry::Shade, Entry::Value] {
             if let Some(handle) = program.entry(entry) {
@@ -232,8 +276,33 @@ impl Shape {
         }
         let sample = program.module().types.iter().find(|(_, ty)| ty.name.as_deref() == Some("Sample"));
         let sample = sample.map(|(handle, _)| merger.ty(&mut import, handle)).transpose()?;
-        Ok(Self { entries, sample })
+        let mut numbers = Vec::new();
+        for (place, parameter) in parameters.iter().enumerate() {
+            if kind_of(parameter) != Some(ParameterType::Attribute) {
+                continue;
+            }
+            for name in ["volact_number", "volact_number_components"] {
+                let wanted = named(&accessors[2 * place], name);
+                let wanted = wanted.ok_or_else(|| ComposeError::inner(format!("no function {name}")))?;
+                numbers.push(merger.function(&mut imports[2 * place], wanted)?);
+            }
+        }
+        Ok(Self { entries, sample, numbers })
     }
+}
+
+/// The function that classifies voxels and interpolates, with a table's in it.
+fn classified(
+    merger: &mut Merger,
+    source: &Module,
+    (table, table_import): (&Module, &mut Import<'_>),
+    number: usize,
+) -> Result<Handle<Function>, ComposeError> {
+    let of = |module, name: &str| named(module, name).ok_or_else(|| ComposeError::inner(format!("no function {name}")));
+    let color = merger.function(table_import, of(table, "volact_table_color")?)?;
+    let mut import = Import::new(source, format!("s{number}_pre_"));
+    import.substitute(of(source, "volact_classified")?, color);
+    merger.function(&mut import, of(source, "volact_pre")?)
 }
 
 /// The constants of a volume's text.
@@ -265,7 +334,9 @@ fn accessor(derived: Derived, module: &Module, stub: Handle<Function>) -> &'stat
         Derived::Segment => "volact_segment",
         Derived::Local => "volact_local",
         Derived::Given => "volact_given",
-        Derived::Plain | Derived::Attribute | Derived::AttributeComponents => {
+        Derived::Attribute => "volact_number",
+        Derived::AttributeComponents => "volact_number_components",
+        Derived::Plain => {
             let result = module.functions[stub].result.as_ref().map(|r| &module.types[r.ty].inner);
             match result {
                 Some(T::Scalar(s)) if s.kind == K::Sint => "volact_i32",
@@ -281,13 +352,25 @@ fn accessor(derived: Derived, module: &Module, stub: Handle<Function>) -> &'stat
     }
 }
 
-/// A function that calls that of a shape, by its number.
+/// Whose functions a hook calls, by compositing and by whether there are slice planes.
+type Who = fn(Compositing, bool) -> bool;
+
+/// The stage's hooks.
+const HOOKED: [(&str, Entry, Who); 5] = [
+    ("volact_shade", Entry::Shade, |kind, _| kind == Compositing::Over),
+    ("volact_shade_hit", Entry::Shade, |kind, planes| kind == Compositing::First || planes && is_deep(kind)),
+    ("volact_shade_flat", Entry::Shade, |kind, _| !is_deep(kind)),
+    ("volact_value_hit", Entry::Value, |kind, _| kind == Compositing::First),
+    ("volact_value_flat", Entry::Value, |kind, _| !is_deep(kind)),
+];
+
+/// A function that calls that of a shape that is there, by its number.
 fn dispatch(
     merger: &mut Merger,
     import: &mut Import<'_>,
     (stage, hook): (&Module, &str),
     (entry, budget): (Entry, u32),
-    shapes: &[Shape],
+    (shapes, there): (&[Shape], &dyn Fn(usize) -> bool),
 ) -> Result<Function, ComposeError> {
     let handle = named(stage, hook).ok_or_else(|| ComposeError::inner(format!("no hook {hook}")))?;
     let model = &stage.functions[handle];
@@ -307,11 +390,11 @@ fn dispatch(
     let shape = made.expressions.append(Expression::FunctionArgument(0), Span::UNDEFINED);
     let sample = made.expressions.append(Expression::FunctionArgument(1), Span::UNDEFINED);
     let mut cases = Vec::new();
-    for (number, other) in shapes.iter().enumerate() {
+    for (number, other) in shapes.iter().enumerate().filter(|(i, _)| there(*i)) {
         let Some((_, function)) = other.entries.iter().find(|(e, _)| *e == entry) else { continue };
         let mut body = Block::new();
         let given = match other.sample {
-            Some(ty) if ty != types[1] => converted(merger, &mut made, &mut body, sample, ty),
+            Some(ty) if ty != types[1] => converted(&mut made, &mut body, sample, ty, &other.numbers),
             _ => sample,
         };
         let called = made.expressions.append(Expression::CallResult(*function), Span::UNDEFINED);
@@ -328,26 +411,26 @@ fn dispatch(
     Ok(made)
 }
 
-/// A sample as a shader's own type of it, whose further members are zero.
+/// A sample as a shader's own type of it, whose further members are numbers of vertices.
 fn converted(
-    merger: &Merger,
     made: &mut Function,
     body: &mut Block,
     sample: Handle<Expression>,
     ty: Handle<Type>,
+    numbers: &[Handle<Function>],
 ) -> Handle<Expression> {
-    let members: Vec<Handle<Type>> = match &merger.module.types[ty].inner {
-        naga::TypeInner::Struct { members, .. } => members.iter().map(|m| m.ty).collect(),
-        _ => Vec::new(),
-    };
-    // Attributes, of which blocks have none, come behind the members that all samples have.
-    let zeros: Vec<_> = members.iter().skip(PLAIN_MEMBERS).map(|ty| Expression::ZeroValue(*ty)).collect();
-    let zeros: Vec<_> = zeros.into_iter().map(|zero| made.expressions.append(zero, Span::UNDEFINED)).collect();
+    let mut read = Vec::new();
+    for function in numbers {
+        let result = made.expressions.append(Expression::CallResult(*function), Span::UNDEFINED);
+        let call = Statement::Call { function: *function, arguments: Vec::new(), result: Some(result) };
+        body.push(call, Span::UNDEFINED);
+        read.push(result);
+    }
     let start = made.expressions.len();
     let member = |index: usize| Expression::AccessIndex { base: sample, index: index as u32 };
     let mut components: Vec<_> =
         (0..PLAIN_MEMBERS).map(|index| made.expressions.append(member(index), Span::UNDEFINED)).collect();
-    components.extend(zeros);
+    components.extend(read);
     let whole = made.expressions.append(Expression::Compose { ty, components }, Span::UNDEFINED);
     body.push(Statement::Emit(made.expressions.range_from(start)), Span::UNDEFINED);
     whole

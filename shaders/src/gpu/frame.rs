@@ -37,7 +37,8 @@ pub struct FrameNumbers {
     pub termination: f32,
     pub infinity: f32,
     pub first_row: u32,
-    pub rest: [u32; 3],
+    pub rest: u32,
+    pub surfaces: [u32; 2],
 }
 
 /// The point from which places are counted.

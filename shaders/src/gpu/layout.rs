@@ -23,6 +23,12 @@ pub struct Recipe {
     pub program: Program,
     /// For each declared parameter how its volume is read; `None` where it is none, or left out.
     pub volumes: Vec<Option<VolumeUse>>,
+    /// Whether it is a mesh.
+    pub mesh: bool,
+    /// Whether there are numbers at its vertices.
+    pub carries: bool,
+    /// The declared volume and table of a shape whose table applies at the voxels, before interpolation.
+    pub pre: Option<[usize; 2]>,
 }
 
 /// The place of a parameter.
@@ -77,7 +83,7 @@ pub(super) fn rows_of(kind: Option<ParameterType>) -> u32 {
         Some(ParameterType::Volume) => 11,
         Some(ParameterType::Matrix) => 4,
         Some(ParameterType::Vec3) => 2,
-        Some(ParameterType::Attribute) | None => 0,
+        None => 0,
         Some(_) => 1,
     }
 }

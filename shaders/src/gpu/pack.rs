@@ -1,14 +1,14 @@
 //! The numbers of a shape as rows of a buffer.
 
 use volact_core::{
-    Clip, Compositing, ControlPoint, LookupTable, ParameterType, ParameterValue, SliceStyle, VolumeTexture,
+    Clip, ClipRegion, Compositing, ControlPoint, LookupTable, ParameterType, ParameterValue, SliceStyle, VolumeTexture,
     glam::{DAffine3, DVec3, DVec4},
     mutated,
     resolve::ResolvedShape,
     volume::Components,
 };
 
-use super::{Anchor, Layout, Recipe, SHAPE_ROWS, skip::Cells, voxels::Units};
+use super::{Anchor, Layout, Recipe, SHAPE_ROWS, mesh, skip::Cells, voxels::Units};
 use crate::{
     eval::{Function, Uniform, Uniforms},
     signatures::{Derived, kind_of},
@@ -32,6 +32,10 @@ pub struct Shape<'a> {
     pub tables: &'a [u32],
     /// What can be skipped.
     pub cells: Option<Cells>,
+    /// Its mesh, where it is one.
+    pub mesh: Option<mesh::Placed>,
+    /// For each declared parameter where its attribute lies.
+    pub attributes: &'a [Row],
 }
 
 /// Writes shapes that are drawn with a layout from an anchor; what is longer for some than for others
@@ -62,14 +66,29 @@ fn floats(v: [f64; 4]) -> Row {
     v.map(|v| (v as f32).to_bits())
 }
 
-fn float3(v: DVec3, w: f64) -> Row {
+pub(super) fn float3(v: DVec3, w: f64) -> Row {
     floats([v.x, v.y, v.z, w])
 }
 
-fn write_affine(rows: &mut [Row], first: usize, map: &DAffine3) {
+pub(super) fn write_affine(rows: &mut [Row], first: usize, map: &DAffine3) {
     for a in 0..3 {
         rows[first + a] = float3(map.matrix3.row(a), map.translation[a]);
     }
+}
+
+fn plane(normal: DVec3, offset: f64, origin: DVec3) -> Row {
+    float3(normal, offset - normal.dot(origin))
+}
+
+/// Writes the regions of clips of the world behind other rows; gives the first and how many there are.
+pub(super) fn write_clips(rows: &mut Vec<Row>, clips: &[&Clip], origin: DVec3) -> Row {
+    let first = rows.len() as u32;
+    let regions = || clips.iter().flat_map(|c| c.regions());
+    for region in regions() {
+        rows.push([region.bounding_planes().len() as u32, u32::from(region.keeps_inside()), 0, 0]);
+        rows.extend(region.bounding_planes().iter().map(|p| plane(p.normal(), p.offset(), origin)));
+    }
+    [first, regions().count() as u32, 0, 0]
 }
 
 impl Shape<'_> {
@@ -86,16 +105,23 @@ impl Shape<'_> {
                     self.write_volume(&mut rows[row..], texture, &units, origin, &uniforms, i);
                     continue;
                 }
-                (Some(ParameterValue::Table(_) | ParameterValue::Attribute(_)), _) => {
+                (Some(ParameterValue::Table(_)), _) => {
                     rows[row][0] = self.tables[i];
                     continue;
                 }
                 _ => {}
             }
             let count = super::layout::rows_of(kind_of(parameter)) as usize;
-            if kind_of(parameter) == Some(ParameterType::Table) {
-                rows[row][0] = self.tables[i];
-                continue;
+            match kind_of(parameter) {
+                Some(ParameterType::Table) => {
+                    rows[row][0] = self.tables[i];
+                    continue;
+                }
+                Some(ParameterType::Attribute) => {
+                    rows[row] = self.attributes[i];
+                    continue;
+                }
+                _ => {}
             }
             let bits = match uniforms.value(program, Function { parameter: i, derived: Derived::Plain }) {
                 Some(Uniform::Floats(v)) => v.iter().map(|v| (*v as f32).to_bits()).collect(),
@@ -158,17 +184,13 @@ impl Shape<'_> {
         let unit = shape.float("unit_distance").unwrap_or(1.0);
         let point = if mutated!("positions_in_f32") { anchor.point.as_vec3().as_dvec3() } else { anchor.point };
         rows[first] = float3(point - origin, unit);
-        // A box that is nothing in one direction holds no ray; its map is not a number there.
-        let block = shape.block().filter(|_| !mutated!("forgotten_roi"));
-        let block = block.unwrap_or_else(|| shape.state.geometry.bounds());
-        let unit = DAffine3::from_scale(1.0 / (block.max - block.min)) * DAffine3::from_translation(-block.min);
-        let map = unit * shape.to_object * DAffine3::from_translation(origin);
-        let empty = !(block.max - block.min).cmpgt(DVec3::ZERO).all();
-        if empty {
-            let nowhere = [0.0, 0.0, 0.0, -1.0];
-            (1..4).for_each(|a| rows[first + a] = floats(nowhere));
-        } else {
-            write_affine(rows, first + 1, &map);
+        let from_local = shape.to_object * DAffine3::from_translation(origin);
+        match self.mesh {
+            Some(mesh) => {
+                write_affine(rows, first + 1, &(mesh.unit * from_local));
+                rows[first + 7][1] = mesh.row;
+            }
+            None => self.write_block(&mut rows[first + 1..], &from_local),
         }
         let kind = match shape.compositing() {
             Compositing::Over => 0,
@@ -181,15 +203,14 @@ impl Shape<'_> {
         let slices = shape.state.geometry.slices();
         let inside = u32::from(slices.is_none_or(|s| s.volume));
         let opaque = u32::from(slices.is_some_and(|s| s.style == SliceStyle::Opaque));
-        let regions = rows.len() as u32;
         let own = shape.state.clip.transformed(&shape.state.transform);
-        let all = || own.regions().iter().chain(clip.regions());
-        let plane = |normal: DVec3, offset: f64| float3(normal, offset - normal.dot(origin));
-        for region in all() {
-            rows.push([region.bounding_planes().len() as u32, u32::from(region.keeps_inside()), 0, 0]);
-            rows.extend(region.bounding_planes().iter().map(|p| plane(p.normal(), p.offset())));
-        }
-        rows[first + 4] = [regions, all().count() as u32, kind, inside | opaque << 1];
+        let region = self.mesh.and_then(|_| shape.first_volume());
+        let region =
+            region.map(|t| Clip::new([ClipRegion::crop(t.geometry_roi())]).transformed(&shape.state.transform));
+        let [regions, count, ..] = write_clips(rows, &[&region.unwrap_or_default(), &own, clip], origin);
+        let (mesh, carries) = (u32::from(self.mesh.is_some()), u32::from(self.recipe.carries));
+        let flags = inside | opaque << 1 | mesh << 2 | carries << 3;
+        rows[first + 4] = [regions, count, kind, flags];
         let levels = self.levels();
         rows[first + 5] = [rows.len() as u32, levels.len() as u32, (rows.len() + levels.len()) as u32, 0];
         rows.extend(levels.iter().map(|v| floats([*v, 0.0, 0.0, 0.0])));
@@ -197,7 +218,7 @@ impl Shape<'_> {
             let normal = shape.to_object.matrix3.transpose() * p.normal();
             let offset = p.offset() - p.normal().dot(shape.to_object.translation);
             let size = normal.length();
-            rows.push(plane(normal / size, offset / size));
+            rows.push(plane(normal / size, offset / size, origin));
             rows[first + 5][3] += 1;
         }
     }
@@ -207,7 +228,20 @@ impl Shape<'_> {
         let first = self.number * SHAPE_ROWS as usize;
         let [x, y, z] = cells.count;
         rows[first + 6] = [cells.base, x, y, z];
-        rows[first + 7] = [layout.slots[self.number][cells.volume].row, 0, 0, 0];
+        rows[first + 7][0] = layout.slots[self.number][cells.volume].row;
+    }
+
+    /// The map from local space to the block as a unit cube.
+    fn write_block(&self, rows: &mut [Row], from_local: &DAffine3) {
+        // A box that is nothing in one direction holds no ray; its map is not a number there.
+        let block = self.shape.block().filter(|_| !mutated!("forgotten_roi"));
+        let block = block.unwrap_or_else(|| self.shape.state.geometry.bounds());
+        let unit = DAffine3::from_scale(1.0 / (block.max - block.min)) * DAffine3::from_translation(-block.min);
+        if (block.max - block.min).cmpgt(DVec3::ZERO).all() {
+            write_affine(rows, 0, &(unit * *from_local));
+        } else {
+            rows[..3].fill(floats([0.0, 0.0, 0.0, -1.0]));
+        }
     }
 
     /// The values whose crossings are seen, in rising order: those of the control points of the first

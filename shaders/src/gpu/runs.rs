@@ -1,15 +1,19 @@
 //! Runs: slabs, one behind the other, of shapes between which no other shape comes. What a rasteriser
 //! draws of a frame: a convex polygon for each run, in the order from front to back.
 
+use std::{borrow::Cow, sync::Arc};
+
 use bytemuck::{Pod, Zeroable};
 use volact_core::{
-    ActionError, FrameDesc,
+    ActionError, Block, FrameDesc, Geometry, ParameterValue,
     glam::{DVec2, DVec3},
+    resolve::ResolvedShape,
     slicing::{Order, Sampling, Slicing, SlicingError, Solid},
 };
 
 use super::{
     is_deep,
+    mesh::{Meshes, is_mesh},
     scene::{Item, Seen},
 };
 
@@ -73,14 +77,14 @@ pub struct Sliced<'a> {
 }
 
 impl<'a> Sliced<'a> {
-    /// Items with what is sliced of them; those of which nothing is there are left out. `action` is whose
-    /// errors are told.
+    /// Items, whose `meshes` are packed, with what is sliced of them; those of which nothing is there are left
+    /// out. `action` is whose errors are told.
     ///
     /// # Errors
     /// If a geometry is damaged, or the frame cannot be sliced.
     pub fn new(
         action: &str,
-        mut items: Vec<Item<'a>>,
+        (mut items, meshes): (Vec<Item<'a>>, &Meshes),
         desc: &FrameDesc,
         sampling: &Sampling,
     ) -> Result<Self, ActionError> {
@@ -88,7 +92,8 @@ impl<'a> Sliced<'a> {
         items.sort_by_key(|i| if is_deep(i.program.compositing()) { (0, i.shape.id) } else { (1, 0) });
         let mut made = Self { items: Vec::with_capacity(items.len()), solids: Vec::new(), deep: 0 };
         for item in items {
-            if let Some(solid) = Solid::new(item.shape, None)? {
+            let Some(shape) = boxed(item.shape, meshes) else { continue };
+            if let Some(solid) = Solid::new(&shape, None)? {
                 made.deep += usize::from(is_deep(item.program.compositing()));
                 made.solids.push(solid);
                 made.items.push(item);
@@ -114,6 +119,20 @@ impl<'a> Sliced<'a> {
     pub fn groups(&self, slicing: &Slicing<'_>) -> Vec<[usize; 2]> {
         in_groups(slicing, self.deep).1
     }
+}
+
+/// A shape for its slabs: of a mesh the box around it, in which fragments find the mesh themselves.
+/// `None` where it has no extent.
+fn boxed<'a>(shape: &'a ResolvedShape, meshes: &Meshes) -> Option<Cow<'a, ResolvedShape>> {
+    if !is_mesh(shape) {
+        return Some(Cow::Borrowed(shape));
+    }
+    let bounds = meshes.bounds(shape)?;
+    let block: Arc<dyn Geometry> = Arc::new(Block::new(bounds.min, bounds.size()).ok()?);
+    let mut made = shape.clone();
+    made.state.geometry = block;
+    made.parameters.retain(|_, value| !matches!(value, ParameterValue::Attribute(_)));
+    Some(Cow::Owned(made))
 }
 
 /// Things in another order.
@@ -168,18 +187,20 @@ fn in_groups(slicing: &Slicing<'_>, deep: usize) -> (Vec<usize>, Vec<[usize; 2]>
 }
 
 /// The runs of a plan from front to back, as polygons of corners; then one for each shape that is a picture
-/// of its own. `groups` are stretches of shapes, as of [`Sliced::groups`]. Slabs are counted from `base`;
+/// of its own; between these, where there are `surfaces`, one of no shape over the whole picture. `groups` are
+/// stretches of shapes, as of [`Sliced::groups`]. Slabs are counted from `base`;
 /// `rest` is where that one begins, seen from the anchor, as of [`border`].
 pub fn corners(
     slicing: &Slicing<'_>,
     groups: &[[usize; 2]],
     (base, rest): (i64, f64),
+    surfaces: bool,
     upward: Upward,
 ) -> (Vec<Corner>, Vec<Polygon>) {
     let sign = if upward == Upward::Yes { DVec2::new(1.0, -1.0) } else { DVec2::ONE };
     let (mut all, mut polygons) = (Vec::new(), Vec::new());
     let number = |n: Option<i64>, open: i32| n.map_or(open, |n| (n - base) as i32);
-    for run in runs(slicing, groups) {
+    for run in runs(slicing, groups, surfaces) {
         let hull = covered(slicing, &run);
         if hull.len() < 3 {
             continue;
@@ -200,9 +221,13 @@ fn strip(count: usize) -> impl Iterator<Item = usize> {
     (0..count).map(move |i| if i % 2 == 0 { i / 2 } else { count - 1 - i / 2 })
 }
 
-/// What a run covers: the hull of one shape, the rectangle around those of several.
+/// What a run covers: the hull of one shape, the rectangle around those of several, all where it is of none.
 fn covered(slicing: &Slicing<'_>, run: &Run) -> Vec<DVec2> {
     let mut hull = Vec::new();
+    if run.there.is_empty() {
+        let size = slicing.pixel_map().size();
+        return vec![DVec2::ZERO, DVec2::new(size.x, 0.0), size, DVec2::new(0.0, size.y)];
+    }
     if let [shape] = run.there[..] {
         slicing.cover(shape, run.levels, &mut hull);
         return hull;
@@ -219,7 +244,7 @@ fn covered(slicing: &Slicing<'_>, run: &Run) -> Vec<DVec2> {
     }
 }
 
-fn runs(slicing: &Slicing<'_>, groups: &[[usize; 2]]) -> Vec<Run> {
+fn runs(slicing: &Slicing<'_>, groups: &[[usize; 2]], surfaces: bool) -> Vec<Run> {
     let reaches = reaches(slicing);
     let mut made: Vec<Run> = Vec::new();
     for &shapes in groups {
@@ -241,6 +266,9 @@ fn runs(slicing: &Slicing<'_>, groups: &[[usize; 2]]) -> Vec<Run> {
         }
     }
     let deep = groups.iter().map(|g| g[1]).max().unwrap_or(0);
+    if surfaces {
+        made.push(Run { shapes: [deep; 2], there: Vec::new(), first: None, end: None, levels: [0.0; 2] });
+    }
     let alone =
         |s: usize| Some(Run { shapes: [s, s + 1], there: vec![s], first: None, end: None, levels: reaches[s]?.levels });
     made.extend((deep..reaches.len()).filter_map(alone));
@@ -294,16 +322,16 @@ mod tests {
         let slicing = Slicing::new(solids.iter().collect(), &frame, &sampling).unwrap();
         let (order, groups) = in_groups(&slicing, 1);
         assert_eq!((order, &groups[..]), (vec![0], &[[0, 1]][..]));
-        let all = runs(&slicing, &groups);
+        let all = runs(&slicing, &groups, false);
         assert!(all.len() > 3 && all.windows(2).all(|r| r[0].end == r[1].first && r[1].first.unwrap() % WHOLE == 0));
         assert!(all[0].first.is_none() && all[all.len() - 1].end.is_none());
         let slabs: f64 = all.iter().map(|r| (r.levels[1] - r.levels[0]) / 0.1).sum();
         assert_eq!(slabs.round() as usize, slicing.step().planes);
-        let (corners, polygons) = corners(&slicing, &groups, (64, 0.25), Upward::No);
+        let (corners, polygons) = corners(&slicing, &groups, (64, 0.25), false, Upward::No);
         assert_eq!(polygons.len(), all.len());
         assert!(corners.iter().all(|c| c.place.iter().all(|v| v.abs() < 1.1) && c.rest == 0.25));
         // The same polygons, turned upside down.
-        let (turned, _) = super::corners(&slicing, &groups, (64, 0.25), Upward::Yes);
+        let (turned, _) = super::corners(&slicing, &groups, (64, 0.25), false, Upward::Yes);
         assert!(corners.iter().zip(&turned).all(|(a, b)| a.place == [b.place[0], -b.place[1]] && a.run == b.run));
         let second = &corners[polygons[1].first as usize];
         assert_eq!(i64::from(second.run[2]), all[1].first.unwrap() - 64);
@@ -342,7 +370,7 @@ mod tests {
         let (solids, frame) = solids(&[DVec3::ZERO, DVec3::splat(0.4)]);
         let slicing = Slicing::new(solids.iter().collect(), &frame, &Sampling::default()).unwrap();
         let (_, groups) = in_groups(&slicing, 1);
-        let all = runs(&slicing, &groups);
+        let all = runs(&slicing, &groups, false);
         let last = &all[all.len() - 1];
         assert_eq!((last.shapes, last.first, last.end), ([1, 2], None, None));
         assert!(all[..all.len() - 1].iter().all(|r| r.shapes == [0, 1]));

@@ -5,7 +5,8 @@ use std::sync::Arc;
 
 use thiserror::Error;
 use volact_core::{
-    Aabb, ActionError, Clip, FrameDesc, Opaque, ParameterType, RayGrid, Viewport, Volume,
+    Aabb, ActionError, Clip, FrameDesc, Opaque, ParameterDecl, ParameterType, ParameterValue, RayGrid,
+    TableInterpolation, Viewport, Volume,
     frame::FrameError,
     glam::DVec3,
     resolve::ResolvedShape,
@@ -14,15 +15,19 @@ use volact_core::{
 
 use super::{
     Anchor, FrameNumbers, Layout, Recipe, VolumeUse,
+    mesh::{Meshes, carries, is_mesh, surface},
     pack::{self, Row},
     skip::Cells,
     table,
     voxels::Encoding,
 };
-use crate::{Program, eval::LOOP_BUDGET, signatures::kind_of};
+use crate::{Program, blunt, eval::LOOP_BUDGET, signatures::kind_of};
 
 /// The most stretches that clips may leave of a ray.
 pub const SPANS: u32 = 16;
+
+/// The shader for which tables apply before interpolation, too.
+const LUT: &str = include_str!("../../wgsl/lut.wgsl");
 
 /// The least rows of a table, so that one a little longer needs no other place.
 const LEAST_ROWS: usize = 64;
@@ -60,19 +65,20 @@ impl<'a> Item<'a> {
             })
         };
         let volumes = self.textures().map(|texture| texture.and_then(volume)).collect();
-        Recipe { program: self.program.clone(), volumes }
+        let (mesh, carries) = (is_mesh(self.shape), carries(self.shape));
+        Recipe { program: self.program.clone(), volumes, mesh, carries, pre: pre(self.shape) }
     }
 }
 
 /// Rows of numbers, and of tables, of all shapes that are drawn with a layout from an anchor. `cells`
-/// are those that can be skipped.
+/// are those that can be skipped, `meshes` are placed. Behind them are surfaces, whose numbers come last.
 pub fn rows(
-    (items, recipes): (&[Item<'_>], &[Recipe]),
+    (items, recipes, surfaces): (&[Item<'_>], &[Recipe], &[&ResolvedShape]),
     (layout, anchor): (&Layout, &Anchor),
     clip: &Clip,
-    cells: &[Option<Cells>],
+    (cells, meshes): (&[Option<Cells>], &Meshes),
     held: impl Fn(&Volume) -> Option<(Encoding, bool)>,
-) -> (Vec<Row>, Vec<Row>) {
+) -> (Vec<Row>, Vec<Row>, [u32; 2]) {
     let mut tables: Vec<Row> = Vec::new();
     let mut places: Vec<Vec<u32>> = Vec::new();
     for item in items {
@@ -89,6 +95,11 @@ pub fn rows(
     }
     let units = |t: Option<&VolumeTexture>| t.and_then(|t| held(t.volume())).map(|(encoding, _)| encoding.units);
     let units: Vec<Vec<_>> = items.iter().map(|item| item.textures().map(units).collect()).collect();
+    let attribute = |item: &Item<'_>, name: &str| meshes.attribute(item.shape, name).unwrap_or_default();
+    let attributes = |item: &Item<'_>| {
+        item.program.declaration().parameters.iter().map(|p| attribute(item, &p.name)).collect::<Vec<_>>()
+    };
+    let attributes: Vec<_> = items.iter().map(attributes).collect();
     let shape = |number: usize| pack::Shape {
         shape: items[number].shape,
         recipe: &recipes[number],
@@ -96,9 +107,38 @@ pub fn rows(
         units: &units[number],
         tables: &places[number],
         cells: cells.get(number).copied().flatten(),
+        mesh: meshes.placed(items[number].shape),
+        attributes: &attributes[number],
     };
     let shapes: Vec<_> = (0..items.len()).map(shape).collect();
-    (pack::write(layout, anchor, clip, &shapes), tables)
+    let mut rows = pack::write(layout, anchor, clip, &shapes);
+    let surfaces = surface::write(&mut rows, surfaces, anchor, clip, meshes);
+    (rows, tables, surfaces)
+}
+
+/// The declared volume and table of a shape whose table applies at the voxels, before interpolation: of the
+/// shader `lut`, as it comes with Volact.
+fn pre(shape: &ResolvedShape) -> Option<[usize; 2]> {
+    let before = |p: &ParameterDecl| shape.table(&p.name).is_some_and(|t| t.interpolation() == TableInterpolation::Pre);
+    let own = shape.shader.source.as_ref().is_none_or(|s| s.text == LUT);
+    let declaration = &shape.shader.declaration;
+    let table = declaration.parameters.iter().position(before).filter(|_| declaration.name == "lut" && own)?;
+    let volume = declaration.parameters.iter().position(|p| kind_of(p) == Some(ParameterType::Volume))?;
+    Some([volume, table])
+}
+
+/// What of a shape actions on GPUs cannot draw, and the cure: what does not go with its shader's source, detail
+/// that single precision has no digits for, and a table before interpolation where nobody can do that.
+pub fn unfit(shape: &ResolvedShape) -> Option<(String, String)> {
+    early(shape).or_else(|| crate::unfit(shape)).or_else(|| blunt(shape))
+}
+
+fn early(shape: &ResolvedShape) -> Option<(String, String)> {
+    let before =
+        |v: &ParameterValue| matches!(v, ParameterValue::Table(t) if t.interpolation() == TableInterpolation::Pre);
+    let (name, _) = shape.parameters.iter().find(|(_, v)| before(v)).filter(|_| pre(shape).is_none())?;
+    let cure = "let it apply after interpolation, or use the shader lut";
+    Some((format!("the pre-interpolated table {name:?}"), cure.into()))
 }
 
 /// What a pipeline depends on.
@@ -110,22 +150,33 @@ pub struct Key {
     pub spans: u32,
     /// Whether a shape has slice planes.
     pub planes: bool,
+    /// For each shape whether it is a mesh, whether that carries numbers, and whether its table applies at the
+    /// voxels.
+    pub kinds: Vec<[bool; 3]>,
+    /// Whether there are surfaces.
+    pub surfaces: bool,
 }
 
 impl Key {
-    /// What the pipeline of shapes depends on; `action` is whose errors are told.
+    /// What the pipeline of shapes and surfaces depends on; `action` is whose errors are told.
     ///
     /// # Errors
     /// If more clips cut away from a shape than a pipeline can hold.
-    pub fn new(action: &str, items: &[Item<'_>], recipes: &[Recipe], clip: &Clip) -> Result<Self, ActionError> {
+    pub fn new(
+        action: &str,
+        (items, surfaces): (&[Item<'_>], &[&ResolvedShape]),
+        recipes: &[Recipe],
+        clip: &Clip,
+    ) -> Result<Self, ActionError> {
         let address = |item: &Item<'_>| Arc::as_ptr(&item.shape.shader) as usize;
         let shapes = items.iter().zip(recipes).map(|(i, r)| (address(i), r.volumes.clone())).collect();
-        let most = items.iter().max_by_key(|i| pack::spans(i.shape, clip));
-        let spans = most.map_or(1, |i| pack::spans(i.shape, clip));
-        if let Some(item) = most.filter(|_| spans > SPANS) {
+        let all = items.iter().map(|i| i.shape).chain(surfaces.iter().copied());
+        let most = all.max_by_key(|s| pack::spans(s, clip));
+        let spans = most.map_or(1, |s| pack::spans(s, clip));
+        if let Some(shape) = most.filter(|_| spans > SPANS) {
             return Err(ActionError::Limit {
                 action: action.into(),
-                what: format!("number of clips that cut away from shape {:?}", item.shape.name),
+                what: format!("number of clips that cut away from shape {:?}", shape.name),
                 found: (spans - 1).to_string(),
                 wanted: format!("at most {}; draw it with the action cpu", SPANS - 1),
             });
@@ -133,7 +184,8 @@ impl Key {
         let planes = items.iter().any(|i| i.shape.state.geometry.slices().is_some());
         // Few sizes, so that a clip more rarely needs another pipeline.
         let spans = if spans > 1 { spans.next_power_of_two().max(4) } else { 1 };
-        Ok(Self { shapes, spans, planes })
+        let kinds = recipes.iter().map(|r| [r.mesh, r.carries, r.pre.is_some()]).collect();
+        Ok(Self { shapes, spans, planes, kinds, surfaces: !surfaces.is_empty() })
     }
 }
 
@@ -149,14 +201,19 @@ pub struct Seen {
 }
 
 impl Seen {
-    /// A frame of shapes, with a world distance between samples.
+    /// A frame of shapes and surfaces, with a world distance between samples.
     ///
     /// # Errors
     /// If the camera is wrong.
-    pub fn new(desc: &FrameDesc, items: &[Item<'_>], step: f64) -> Result<Self, FrameError> {
+    pub fn new(
+        desc: &FrameDesc,
+        (items, surfaces): (&[Item<'_>], &[&ResolvedShape]),
+        step: f64,
+    ) -> Result<Self, FrameError> {
         let viewport = desc.viewport();
         let grid = desc.camera.rays(&viewport)?;
-        let bounds = items.iter().fold(Aabb::EMPTY, |b, i| b.union(&i.shape.world_block()));
+        let all = items.iter().map(|i| i.shape).chain(surfaces.iter().copied());
+        let bounds = all.fold(Aabb::EMPTY, |b, s| b.union(&s.world_block()));
         let bounds = if bounds.is_empty() { Aabb::new(DVec3::ZERO, DVec3::ZERO) } else { bounds };
         let anchor = Anchor::new(&grid, &viewport, &bounds, step);
         Ok(Self { grid, viewport, anchor })
@@ -167,9 +224,11 @@ impl Seen {
         self.anchor.t - self.anchor.depth_zero
     }
 
-    /// The rows of the frame; `limited` tells that something was drawn already.
-    pub fn rows(&self, desc: &FrameDesc, termination: f64, limited: bool) -> Vec<Row> {
+    /// The rows of the frame; `limited` tells that something was drawn already, and `surfaces` are numbers of
+    /// surfaces, as [`rows`] gives them.
+    pub fn rows(&self, desc: &FrameDesc, termination: f64, limited: bool, surfaces: [u32; 2]) -> Vec<Row> {
         let numbers = FrameNumbers {
+            surfaces,
             limited: u32::from(limited),
             threshold: desc.depth_threshold,
             termination: termination as f32,
@@ -224,6 +283,16 @@ pub fn overrun(name: Option<&String>, drawn: &[&ResolvedShape], watched: bool) -
     let shader = drawn.iter().find(|s| s.name == shape).map(|s| s.shader.declaration.name.clone());
     let rounds = if watched { LOOP_BUDGET / 2 } else { LOOP_BUDGET };
     ActionError::Shader { shape, source: Box::new(Overrun { shader: shader.unwrap_or_default(), rounds }) }
+}
+
+/// The error of a shape, by its name, whose cells carry numbers and overlap.
+pub fn overlapping(action: &str, name: Option<&String>) -> ActionError {
+    ActionError::Unsupported {
+        action: action.into(),
+        shape: name.cloned().unwrap_or_default(),
+        what: "a mesh whose cells carry numbers and overlap".into(),
+        cure: "mend the mesh, or draw it with the action cpu".into(),
+    }
 }
 
 /// The error of an adapter that has cut a loop of the framework short.

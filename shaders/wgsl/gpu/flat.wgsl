@@ -2,16 +2,33 @@
 // ray, and then its colour, once.
 
 fn volact_flat(shape: u32, ray: VolactRay) -> vec4<f32> {
-    let spans = volact_spans(shape, ray);
-    if spans.count == 0u { return vec4<f32>(0.0); }
     let kind = volact_numbers[8u * shape + 4u].z;
-    var value = 0.0;
-    var length = 0.0;
-    var inside = 0.0;
+    var all = VolactReduced(0.0, 0.0, 0.0, volact_frame.infinity);
+    var rest = volact_whole();
+    loop {
+        let spans = volact_spans(shape, ray, rest);
+        rest = volact_rest;
+        all = volact_reduced_spans(shape, ray, spans, all);
+        if !MESHES || !rest.more { break; }
+    }
+    if all.length == 0.0 { return vec4<f32>(0.0); }
+    var value = all.value;
+    if kind == VOLACT_AVERAGE { value = value / all.length; }
+    if kind == VOLACT_ADD { value = value / volact_floats(8u * shape).w; }
+    return volact_premultiplied(volact_shade_flat(shape, volact_sample(shape, ray, all.begin, all.inside, value)));
+}
+
+// The value of what was seen, the length of that, the length inside, and where that begins.
+struct VolactReduced { value: f32, length: f32, inside: f32, begin: f32 }
+
+fn volact_reduced_spans(shape: u32, ray: VolactRay, spans: VolactSpans, before: VolactReduced) -> VolactReduced {
+    let kind = volact_numbers[8u * shape + 4u].z;
+    var all = before;
     for (var i = 0u; i < spans.count; i += 1u) {
         let a = spans.ends[i].x;
         let b = spans.ends[i].y;
-        inside += b - a;
+        all.begin = min(all.begin, a);
+        all.inside += b - a;
         var k = volact_first_segment(a);
         var border = volact_border(k);
         while border < b {
@@ -20,19 +37,16 @@ fn volact_flat(shape: u32, ray: VolactRay) -> vec4<f32> {
             border = volact_border(k);
             let t1 = min(border, b);
             if t1 > t0 {
-                let v = volact_value_of(shape, volact_sample(shape, ray, 0.5 * (t0 + t1), t1 - t0, 0.0));
+                let v = volact_value_flat(shape, volact_sample(shape, ray, 0.5 * (t0 + t1), t1 - t0, 0.0));
                 volact_samples += 1u;
                 if !volact_is_nan(v) {
-                    value = volact_reduced(kind, value, length, v, t1 - t0);
-                    length += t1 - t0;
+                    all.value = volact_reduced(kind, all.value, all.length, v, t1 - t0);
+                    all.length += t1 - t0;
                 }
             }
         }
     }
-    if length == 0.0 { return vec4<f32>(0.0); }
-    if kind == VOLACT_AVERAGE { value = value / length; }
-    if kind == VOLACT_ADD { value = value / volact_floats(8u * shape).w; }
-    return volact_premultiplied(volact_shade(shape, volact_sample(shape, ray, spans.ends[0].x, inside, value)));
+    return all;
 }
 
 fn volact_reduced(kind: u32, value: f32, length: f32, v: f32, more: f32) -> f32 {

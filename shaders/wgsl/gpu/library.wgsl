@@ -41,16 +41,22 @@ struct VolactFrame {
     infinity: f32,
     // Rows of this dispatch begin here.
     first_row: u32,
+    // The number of the first surface, and the one after the last.
+    surfaces: vec2<u32>,
 }
 
 @group(0) @binding(0) var<uniform> volact_frame: VolactFrame;
 @group(0) @binding(1) var<uniform> volact_numbers: array<vec4<u32>, 4096>;
 @group(0) @binding(2) var<storage, read> volact_tables: array<vec4<u32>>;
-@group(0) @binding(6) var<storage, read_write> volact_flags: array<atomic<u32>, 194>;
+@group(0) @binding(6) var<storage, read_write> volact_flags: array<atomic<u32>, 195>;
+@group(0) @binding(8) var<storage, read> volact_meshes: array<vec4<u32>>;
 
 // Rounds that loops of shaders may still go for this sample, and the shape that is evaluated.
 var<private> volact_rounds: u32;
 var<private> volact_shape: u32;
+// The vertices of the cell that holds the sample at hand, and what each counts for there.
+var<private> volact_corners: vec4<u32>;
+var<private> volact_weights: vec4<f32>;
 
 fn volact_floats(row: u32) -> vec4<f32> { return bitcast<vec4<f32>>(volact_numbers[row]); }
 
@@ -70,6 +76,8 @@ fn volact_round() -> bool {
 
 // Told of a loop that ended without having been left.
 fn volact_short() { atomicMax(&volact_flags[129], 1u); }
+
+fn volact_mesh_row(row: u32) -> vec4<f32> { return bitcast<vec4<f32>>(volact_meshes[row]); }
 
 // -ln(1 - a): by the series of the inverse hyperbolic tangent up to one half, where the first term
 // left out is below 1e-8 of the sum; infinite for 1.

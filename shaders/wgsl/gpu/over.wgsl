@@ -1,7 +1,16 @@
 // One shape alone that emits and absorbs: its stretches segment by segment.
 
 fn volact_over(shape: u32, ray: VolactRay) {
-    let spans = volact_spans(shape, ray);
+    var rest = volact_whole();
+    loop {
+        let spans = volact_spans(shape, ray, rest);
+        rest = volact_rest;
+        if volact_over_spans(shape, ray, spans) || !MESHES || !rest.more { return; }
+    }
+}
+
+// Whether the ray ends there.
+fn volact_over_spans(shape: u32, ray: VolactRay, spans: VolactSpans) -> bool {
     for (var i = 0u; i < spans.count; i += 1u) {
         let a = spans.ends[i].x;
         let b = spans.ends[i].y;
@@ -30,7 +39,8 @@ fn volact_over(shape: u32, ray: VolactRay) {
                     if volact_seen(m) { volact_through(m, t0, t1); }
                 }
             }
-            if volact_is_done(from_k, k) { return; }
+            if volact_is_done(from_k, k) { return true; }
         }
     }
+    return false;
 }

@@ -18,10 +18,16 @@ fn volact_picture(@builtin(global_invocation_id) id: vec3<u32>) {
         limit = volact_limits[2u * at + 1u].x;
         ray.end = min(ray.end, limit);
     }
+    let surface = volact_first_surface(ray);
+    ray.end = min(ray.end, surface.w);
     if ALONE {
         volact_over(0u, ray);
     } else {
         volact_sweep(ray);
+    }
+    if !volact_is_infinite(surface.w) {
+        volact_samples += 1u;
+        volact_meet(vec4<f32>(surface.rgb, 1.0), surface.w);
     }
     if volact_frame.limited != 0u { volact_meet(volact_limits[2u * at], limit); }
     for (var shape = DEEP; shape < SHAPES; shape += 1u) {

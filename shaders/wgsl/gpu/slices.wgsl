@@ -6,7 +6,8 @@
 // is left of the light from behind, depth, a state, and the number of samples. The states: 0 nothing
 // yet, 1 some, 2 enough: the ray has ended, 3 shapes that are one picture each are being laid over.
 //
-// A shape that is one picture is one run, after all others. Light is that of a band of rows, from first_row on.
+// A shape that is one picture is one run, after all others. Before those, where there are surfaces, comes a run
+// of no shape, which lays them behind what was gathered. Light is that of a band of rows, from first_row on.
 //
 // Levels are counted along the axis from the anchor; slab k begins at k steps and a rest, which is what
 // the anchor lacks to a plane. A run's ends beyond which there is nothing of its shapes are open, so that
@@ -61,7 +62,9 @@ fn volact_gather(run: vec4<i32>, whole: VolactRay) -> bool {
     ray.end = min(ray.end, volact_reach.y);
     let first = volact_members.x;
     let numbers = volact_numbers[8u * first + 5u];
-    if ALONES || (volact_members.y == first + 1u && volact_kind(first) == 0u && numbers.w == 0u) {
+    // Of meshes both would take long to compile.
+    let single = !MESHES && volact_members.y == first + 1u && volact_kind(first) == 0u && numbers.w == 0u;
+    if ALONES || single {
         volact_over(first, ray);
     } else {
         volact_sweep(ray);
@@ -79,7 +82,7 @@ fn volact_run(corner: VolactCorner) {
     volact_dark();
     let known = volact_light[at + 1u];
     volact_members = vec2<u32>(corner.run.xy);
-    let flat_one = DEEP < SHAPES && volact_members.x >= DEEP;
+    let flat_one = DEEP < SHAPES && volact_members.x >= DEEP && volact_members.x < volact_members.y;
     if known.z == 2.0 && !flat_one { return; }
     if known.z != 0.0 {
         volact_color = volact_light[at];
@@ -93,8 +96,14 @@ fn volact_run(corner: VolactCorner) {
         limit = volact_limits[behind + 1u].x;
         ray.end = min(ray.end, limit);
     }
+    let surface = volact_first_surface(ray);
+    ray.end = min(ray.end, surface.w);
     var state = 1.0;
-    if flat_one {
+    if volact_members.x == volact_members.y {
+        if volact_is_infinite(surface.w) { return; }
+        volact_samples += 1u;
+        volact_meet(vec4<f32>(surface.rgb, 1.0), surface.w);
+    } else if flat_one {
         // What was drawn already lies behind the first picture of its own.
         if known.z != 3.0 && volact_frame.limited != 0u { volact_meet(volact_limits[behind], limit); }
         let color = volact_flat(volact_members.x, ray);

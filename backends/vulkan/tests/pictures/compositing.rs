@@ -28,7 +28,7 @@ fn behind(frame: FrameDesc) -> FrameDesc {
     frame.with_opaque(Opaque { color: Some(color.into()), depth: OpaqueDepth::Distance(distance.into()) })
 }
 
-fn agree(action: &mut dyn RenderAction, what: &str, shapes: &[Shape], frame: &FrameDesc, least: f32) {
+pub fn agree(action: &mut dyn RenderAction, what: &str, shapes: &[Shape], frame: &FrameDesc, least: f32) {
     let (wanted, depth) = planes(shapes, frame, STEP);
     let made = draw(action, shapes, frame);
     let error = worst(&made, &wanted);

@@ -4,13 +4,15 @@
 //! installed, and whatever they say fails the test.
 
 mod compositing;
+mod meshes;
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use volact_core::{
-    Aabb, ActionError, Appearance, Camera, Clip, Compositing, ControlPoint, Declaration, Frame, FrameDesc, LookupTable,
-    Opaque, OpaqueDepth, Options, ParameterDecl, ParameterType, Plane, Projection, Registry, RenderAction, ScalarType,
-    ShaderEntry, ShaderText, Shape, Sphere, TableInterpolation, Viewport, Volume, VolumeDesc, WarningCode,
+    Aabb, ActionError, Appearance, Block, Buffer, Camera, CellType, CellTypes, Clip, Compositing, ControlPoint,
+    Declaration, Frame, FrameDesc, Geometry, LookupTable, Mesh, Opaque, OpaqueDepth, Options, ParameterDecl,
+    ParameterType, Plane, Projection, Registry, RenderAction, ScalarType, ShaderEntry, ShaderText, Shape, Sphere,
+    TableInterpolation, Viewport, Volume, VolumeDesc, WarningCode,
     geometry::ClipRegion,
     glam::{DAffine3, DVec3},
     parameter::Kind,
@@ -234,12 +236,14 @@ fn what_is_not_drawn_is_refused_by_name() {
     let _alone = alone();
     let Some(mut action) = action(&[]) else { return };
     let volume = data(ScalarType::U8);
-    let sphere = Sphere::new(DVec3::ZERO, 1.0, 12).unwrap();
+    let cube = Block::new(DVec3::ZERO, DVec3::ONE).unwrap().tessellate().unwrap();
+    let (cells, places) = (Buffer::from_vec(cube.tetrahedra.concat()), cube.vertices.clone());
+    let carrying = Mesh::new(cube.vertices, CellTypes::All(CellType::Tetrahedron), cells).unwrap();
+    let carrying = carrying.with_texture_coordinates(places).unwrap();
     let lut = || Appearance::new("lut").with("lookup_table", table());
     let pre = table().pre_interpolated();
     assert_eq!(pre.interpolation(), TableInterpolation::Pre);
     let shapes = [
-        (Shape::new(sphere, lut().with("volume", &volume)), "geometry \"sphere\""),
         (Shape::around(&volume, Appearance::new("lut").with("lookup_table", pre)), "pre-interpolated table"),
         (Shape::around(&volume, lut().with("component", 3i64)), "component 3"),
     ];
@@ -247,6 +251,10 @@ fn what_is_not_drawn_is_refused_by_name() {
         let error = action.manage(&shape).unwrap_err();
         assert!(matches!(error, ActionError::Unsupported { .. }) && error.to_string().contains(words), "{error}");
     }
+    // What is known only once it is taken apart.
+    let carrying = Shape::new(carrying, lut().with("volume", &volume));
+    let error = action.manage(&carrying).unwrap_err();
+    assert!(matches!(error, ActionError::Unsupported { .. }) && error.to_string().contains("texture coord"), "{error}");
     // The action is as good as before.
     let shapes = [block(ScalarType::U8)];
     assert!(draw(&mut *action, &shapes, &views()[0]).statistics.rays > 0);

@@ -59,6 +59,17 @@ fn tables_through_all_cameras() {
 }
 
 #[test]
+fn tables_before_interpolation() {
+    let other =
+        volume([9, 8, 10], ScalarType::F32, |p| if p.x == 3.0 && p.z > 5.0 { f64::NAN } else { 9.0 * p.x + 5.0 * p.y });
+    for table in [warm(), cold()] {
+        for texture in [a_ball(), a_ball().with_filter(Filter::Nearest), VolumeTexture::new(&other)] {
+            agree("before", &[lut_of(&texture, table.clone().pre_interpolated(), 1.0)], &view());
+        }
+    }
+}
+
+#[test]
 fn every_type_of_voxel() {
     for scalar in ScalarType::ALL {
         let shape = lut(&ball([9, 8, 10], scalar), warm(), 1.0);

@@ -4,4 +4,5 @@ mod agreement;
 mod bands;
 mod common;
 mod life;
+mod meshes;
 mod onto;
