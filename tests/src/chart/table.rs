@@ -12,72 +12,55 @@
 //! | `max`, `rmse`, `p99` | one | errors against the same truth, in numbers from 0 to 1 |
 //! | `samples`, `resident_bytes` | | samples taken, bytes held |
 //! | `machine`, `device`, `method` | | where, on what and how |
+//! | `size` | | columns x rows of the picture, which must be the chart's |
 //!
 //! Columns are found by name, in any order; one that is not known is an error.
 
-use std::{collections::BTreeMap, path::Path};
+use std::{collections::BTreeMap, fmt::Write as _, fs, io, path::Path};
 
-use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::{Chart, Point};
 
-/// A row of the table.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Line {
-    scene: String,
-    action: String,
-    #[serde(default)]
-    series: String,
-    #[serde(default)]
-    settings: String,
-    #[serde(default)]
-    step: Option<f64>,
-    median_s: f64,
-    #[serde(default)]
-    q1_s: Option<f64>,
-    #[serde(default)]
-    q3_s: Option<f64>,
-    #[serde(default)]
-    least_s: Option<f64>,
-    #[serde(default)]
-    first_s: Option<f64>,
-    #[serde(default)]
-    frames: Option<usize>,
-    #[serde(default)]
-    max: Option<f64>,
-    #[serde(default)]
-    rmse: Option<f64>,
-    #[serde(default)]
-    p99: Option<f64>,
-    #[serde(default)]
-    samples: Option<u64>,
-    #[serde(default)]
-    resident_bytes: Option<usize>,
-    #[serde(default)]
-    machine: String,
-    #[serde(default)]
-    device: String,
-    #[serde(default)]
-    method: String,
-}
+/// The columns, in the order in which they are written.
+const COLUMNS: [&str; 20] = [
+    "scene",
+    "action",
+    "series",
+    "settings",
+    "step",
+    "median_s",
+    "q1_s",
+    "q3_s",
+    "least_s",
+    "first_s",
+    "frames",
+    "max",
+    "rmse",
+    "p99",
+    "samples",
+    "resident_bytes",
+    "machine",
+    "device",
+    "method",
+    "size",
+];
 
 /// Why a table cannot be read.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum TableError {
-    /// It is no table of points.
-    #[error("{path}: no table of points")]
-    Csv {
-        /// The file.
+    /// The file.
+    #[error("{path}: cannot be read")]
+    File {
+        /// Its path.
         path: String,
-        /// Why, with the line.
-        source: csv::Error,
+        /// Why.
+        source: io::Error,
     },
-    /// A number makes no sense.
+    /// A line, or a number in it.
     #[error("{path}, line {line}: {what}")]
-    Value {
+    Line {
         /// The file.
         path: String,
         /// From 1, the header included.
@@ -88,102 +71,189 @@ pub enum TableError {
 }
 
 /// All points of a chart.
-///
-/// # Errors
-/// If they cannot be written, which memory always can.
-pub fn csv(chart: &Chart) -> Result<String, csv::Error> {
-    let mut writer = csv::Writer::from_writer(Vec::new());
+pub fn csv(chart: &Chart) -> String {
+    let mut text = format!("{}\n", COLUMNS.join(","));
     for scene in &chart.scenes {
+        let size = format!("{}x{}", scene.width, scene.height);
         for p in &scene.points {
-            let words = p.settings.iter().map(|(name, value)| format!("{name}={value}"));
-            writer.serialize(Line {
-                scene: scene.name.clone(),
-                action: p.action.clone(),
-                series: p.series.clone(),
-                settings: words.collect::<Vec<_>>().join(" "),
-                step: p.step,
-                median_s: p.median_s,
-                q1_s: Some(p.quartiles_s[0]),
-                q3_s: Some(p.quartiles_s[1]),
-                least_s: Some(p.least_s),
-                first_s: Some(p.first_s),
-                frames: Some(p.frames),
-                max: p.max,
-                rmse: p.rmse,
-                p99: p.p99,
-                samples: Some(p.samples),
-                resident_bytes: Some(p.resident_bytes),
-                machine: p.machine.clone(),
-                device: p.device.clone(),
-                method: p.method.clone(),
-            })?;
+            let words: Vec<_> = p.settings.iter().map(|(name, value)| format!("{name}={value}")).collect();
+            let number = |v: Option<f64>| v.map_or(String::new(), |v| v.to_string());
+            let cells = [
+                scene.name.clone(),
+                p.action.clone(),
+                p.series.clone(),
+                words.join(" "),
+                number(p.step),
+                p.median_s.to_string(),
+                p.quartiles_s[0].to_string(),
+                p.quartiles_s[1].to_string(),
+                p.least_s.to_string(),
+                p.first_s.to_string(),
+                p.frames.to_string(),
+                number(p.max),
+                number(p.rmse),
+                number(p.p99),
+                p.samples.to_string(),
+                p.resident_bytes.to_string(),
+                p.machine.clone(),
+                p.device.clone(),
+                p.method.clone(),
+                size.clone(),
+            ];
+            _ = writeln!(text, "{}", cells.map(|cell| quoted(&cell)).join(","));
         }
     }
-    let bytes = writer.into_inner().map_err(|e| e.into_error())?;
-    Ok(String::from_utf8_lossy(&bytes).into_owned())
+    text
+}
+
+/// A cell, in quotation marks where it needs them (RFC 4180).
+fn quoted(cell: &str) -> String {
+    if cell.contains(['"', ',', '\n', '\r']) { format!("\"{}\"", cell.replace('"', "\"\"")) } else { cell.into() }
+}
+
+/// The lines of a table, each with its number and its cells (RFC 4180; blanks around cells do not count).
+fn cells(text: &str) -> Result<Vec<(usize, Vec<String>)>, (usize, String)> {
+    let (mut lines, mut cells, mut cell) = (Vec::new(), Vec::new(), String::new());
+    let (mut line, mut start, mut within, mut was_quoted) = (1, 1, false, false);
+    let mut chars = text.chars().chain(std::iter::once('\n')).peekable();
+    while let Some(c) = chars.next() {
+        line += usize::from(c == '\n');
+        match c {
+            '"' if within && chars.peek() == Some(&'"') => cell.extend(chars.next()),
+            '"' if within => within = false,
+            c if within && chars.peek().is_some() => cell.push(c),
+            '"' if cell.trim().is_empty() && !was_quoted => {
+                cell.clear();
+                (within, was_quoted) = (true, true);
+            }
+            ',' | '\n' if !within => {
+                cells.push(if was_quoted { std::mem::take(&mut cell) } else { cell.trim().to_owned() });
+                cell.clear();
+                was_quoted = false;
+                if c == '\n' {
+                    if cells.iter().any(|cell| !cell.is_empty()) {
+                        lines.push((start, std::mem::take(&mut cells)));
+                    }
+                    cells.clear();
+                    start = line;
+                }
+            }
+            c if was_quoted && c.is_whitespace() => {}
+            _ if was_quoted => return Err((start, "text after the closing quotation mark of a cell".into())),
+            c => cell.push(c),
+        }
+    }
+    if within { Err((start, "a quotation mark that is not closed".into())) } else { Ok(lines) }
 }
 
 /// Joins the points of a table to the scenes of a chart. Returns how many.
 ///
 /// # Errors
-/// If it cannot be read, a number is none, or a scene is not in the chart.
+/// If it cannot be read, a column is not known, a number is none, or a scene is not in the chart.
 pub fn join(chart: &mut Chart, path: &Path) -> Result<usize, TableError> {
     let name = path.display().to_string();
-    let failed = |source| TableError::Csv { path: name.clone(), source };
-    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_path(path).map_err(failed)?;
-    let mut joined = 0;
-    for (i, line) in reader.deserialize().enumerate() {
-        let line: Line = line.map_err(failed)?;
-        let wrong = |what| TableError::Value { path: name.clone(), line: i + 2, what };
-        check(&line).map_err(wrong)?;
+    let text = fs::read_to_string(path).map_err(|source| TableError::File { path: name.clone(), source })?;
+    let wrong = |line, what| TableError::Line { path: name.clone(), line, what };
+    let lines = cells(&text).map_err(|(line, what)| wrong(line, what))?;
+    let Some(((at, header), rest)) = lines.split_first() else {
+        return Err(wrong(1, "there is no header, wanted names of columns".into()));
+    };
+    check_header(header).map_err(|what| wrong(*at, what))?;
+    for (at, cells) in rest {
+        let joined = Line::new(header, cells).and_then(|line| line.join(chart));
+        joined.map_err(|what| wrong(*at, what))?;
+    }
+    Ok(rest.len())
+}
+
+fn check_header(header: &[String]) -> Result<(), String> {
+    if let Some(odd) = header.iter().find(|name| !COLUMNS.contains(&name.as_str())) {
+        let hint = volact_core::names::hint(odd, COLUMNS);
+        return Err(format!("no column is called {odd:?}{hint}; known: {}", COLUMNS.join(", ")));
+    }
+    if let Some(twice) = header.iter().enumerate().find(|(i, name)| header[..*i].contains(name)) {
+        return Err(format!("column {:?} is there twice", twice.1));
+    }
+    match ["scene", "action", "median_s"].iter().find(|name| !header.iter().any(|h| h == *name)) {
+        Some(missing) => Err(format!("there is no column {missing:?}, which is needed")),
+        None => Ok(()),
+    }
+}
+
+/// A line, by the names of its columns.
+struct Line<'a>(BTreeMap<&'a str, &'a str>);
+
+impl<'a> Line<'a> {
+    fn new(header: &'a [String], cells: &'a [String]) -> Result<Self, String> {
+        if cells.len() != header.len() {
+            return Err(format!("{} cells, wanted {} as in the header", cells.len(), header.len()));
+        }
+        let pairs = header.iter().map(String::as_str).zip(cells.iter().map(String::as_str));
+        Ok(Self(pairs.filter(|(_, cell)| !cell.is_empty()).collect()))
+    }
+
+    fn text(&self, name: &str) -> String {
+        self.0.get(name).copied().unwrap_or_default().to_owned()
+    }
+
+    /// A number above 0, or 0 where that `counts`, too.
+    fn number(&self, name: &str, counts: bool) -> Result<Option<f64>, String> {
+        let Some(cell) = self.0.get(name) else { return Ok(None) };
+        let wanted = if counts { "0 or more" } else { "above 0" };
+        let good = |v: &f64| v.is_finite() && (*v > 0.0 || counts && *v == 0.0);
+        match cell.parse().ok().filter(good) {
+            Some(value) => Ok(Some(value)),
+            None => Err(format!("{name} is {cell:?}, wanted a number {wanted}")),
+        }
+    }
+
+    fn join(&self, chart: &mut Chart) -> Result<(), String> {
         let known = chart.scenes.iter().map(|s| s.name.clone()).collect::<Vec<_>>().join(", ");
-        let Some(scene) = chart.scenes.iter_mut().find(|s| s.name == line.scene) else {
-            return Err(wrong(format!("scene is {:?}, wanted one of the chart: {known}", line.scene)));
-        };
-        scene.points.push(point(line));
-        joined += 1;
+        let wanted = self.text("scene");
+        let scene = chart.scenes.iter_mut().find(|s| s.name == wanted);
+        let scene = scene.ok_or_else(|| format!("scene is {wanted:?}, wanted one of the chart: {known}"))?;
+        let (size, found) = (format!("{}x{}", scene.width, scene.height), self.text("size"));
+        if !found.is_empty() && found != size {
+            return Err(format!("size is {found}, wanted that of the chart, {size}"));
+        }
+        scene.points.push(self.point()?);
+        Ok(())
     }
-    Ok(joined)
-}
 
-fn check(line: &Line) -> Result<(), String> {
-    if !(line.median_s > 0.0 && line.median_s.is_finite()) {
-        return Err(format!("median_s is {}, wanted seconds above 0", line.median_s));
-    }
-    let errors = [("max", line.max), ("rmse", line.rmse), ("p99", line.p99)];
-    if let Some((name, Some(value))) = errors.iter().find(|(_, v)| v.is_some_and(|v| !(v >= 0.0 && v.is_finite()))) {
-        return Err(format!("{name} is {value}, wanted an error of 0 or more"));
-    }
-    if errors.iter().all(|(_, value)| value.is_none()) {
-        return Err("there is no error, wanted a number in max, rmse or p99".into());
-    }
-    Ok(())
-}
-
-fn point(line: Line) -> Point {
-    let quartile = |q: Option<f64>| q.filter(|q| *q > 0.0 && q.is_finite()).unwrap_or(line.median_s);
-    let settings = if line.settings.is_empty() { None } else { Some(("settings".to_owned(), line.settings.clone())) };
-    Point {
-        key: String::new(),
-        series: if line.series.is_empty() { line.action.clone() } else { line.series },
-        action: line.action,
-        settings: BTreeMap::from_iter(settings),
-        step: line.step,
-        median_s: line.median_s,
-        quartiles_s: [line.q1_s, line.q3_s].map(quartile),
-        least_s: quartile(line.least_s),
-        first_s: quartile(line.first_s),
-        frames: line.frames.unwrap_or(0),
-        max: line.max,
-        rmse: line.rmse,
-        p99: line.p99,
-        samples: line.samples.unwrap_or(0),
-        resident_bytes: line.resident_bytes.unwrap_or(0),
-        machine: line.machine,
-        device: line.device,
-        method: line.method,
-        picture: None,
-        difference: None,
+    fn point(&self) -> Result<Point, String> {
+        let median_s = self.number("median_s", false)?.ok_or("there is no median_s, wanted seconds")?;
+        let seconds = |name: &str| Ok::<_, String>(self.number(name, false)?.unwrap_or(median_s));
+        let count = |name: &str| Ok::<_, String>(self.number(name, true)?.unwrap_or(0.0));
+        let (max, rmse, p99) = (self.number("max", true)?, self.number("rmse", true)?, self.number("p99", true)?);
+        if max.or(rmse).or(p99).is_none() {
+            return Err("there is no error, wanted a number in max, rmse or p99".into());
+        }
+        let (action, series, settings) = (self.text("action"), self.text("series"), self.text("settings"));
+        if action.is_empty() {
+            return Err("there is no action, wanted the program's name".into());
+        }
+        Ok(Point {
+            key: String::new(),
+            series: if series.is_empty() { action.clone() } else { series },
+            action,
+            settings: (!settings.is_empty()).then(|| ("settings".to_owned(), settings)).into_iter().collect(),
+            step: self.number("step", false)?,
+            median_s,
+            quartiles_s: [seconds("q1_s")?, seconds("q3_s")?],
+            least_s: seconds("least_s")?,
+            first_s: seconds("first_s")?,
+            frames: count("frames")? as usize,
+            max,
+            rmse,
+            p99,
+            samples: count("samples")? as u64,
+            resident_bytes: count("resident_bytes")? as usize,
+            machine: self.text("machine"),
+            device: self.text("device"),
+            method: self.text("method"),
+            picture: None,
+            difference: None,
+        })
     }
 }
 
@@ -232,8 +302,15 @@ mod tests {
             p99: Some(1e-3),
             ..Point::default()
         };
-        let text = csv(&chart(vec![point.clone()])).unwrap();
+        let text = csv(&chart(vec![point.clone()]));
         assert_eq!(joined(&text).unwrap().scenes[0].points, [point]);
+    }
+
+    #[test]
+    fn cells_in_quotation_marks_may_hold_anything() {
+        let found = cells("a, b \n\"x, \"\"y\"\"\nz\" ,2\r\n\n3,4").unwrap();
+        let of = |cells: [&str; 2]| cells.map(str::to_owned).to_vec();
+        assert_eq!(found, [(1, of(["a", "b"])), (2, of(["x, \"y\"\nz", "2"])), (5, of(["3", "4"]))]);
     }
 
     #[test]
@@ -241,15 +318,22 @@ mod tests {
         let other = joined("scene,action,median_s,rmse\nhead, vtk ,0.04,1e-3\n").unwrap();
         let point = &other.scenes[0].points[0];
         assert_eq!((point.action.as_str(), point.series.as_str(), point.quartiles_s), ("vtk", "vtk", [0.04; 2]));
+        let base = "scene,action,median_s,rmse\n";
         for (text, words) in [
-            ("scene,action,median_s,rmse\nhed,vtk,0.04,1e-3\n", ["line 2", "\"hed\"", "head"]),
-            ("scene,action,median_s,rmse\nhead,vtk,-1,1e-3\n", ["line 2", "median_s", "-1"]),
-            ("scene,action,median_s,rmse\nhead,vtk,1,NaN\n", ["line 2", "rmse", "NaN"]),
-            ("scene,action,median_s\nhead,vtk,1\n", ["line 2", "no error", "p99"]),
-            ("scene,action,time,rmse\nhead,vtk,1,1\n", ["no table", "time", ""]),
-            ("scene,action,median_s,rmse\nhead,vtk\n", ["no table", "line: 2", ""]),
+            (format!("{base}hed,vtk,0.04,1e-3\n"), ["line 2", "\"hed\"", "head"]),
+            (format!("{base}head,vtk,1,1\n\nhead,vtk,-1,1e-3\n"), ["line 4", "median_s", "-1"]),
+            (format!("{base}head,vtk,1,NaN\n"), ["line 2", "rmse", "NaN"]),
+            (format!("{base}head,vtk,1,\n"), ["line 2", "no error", "p99"]),
+            (format!("{base}head,vtk\n"), ["line 2", "2 cells", "wanted 4"]),
+            (format!("{base}head,\"vtk,1,1\n"), ["line 2", "quotation mark", "not closed"]),
+            (format!("{base}head,\"vtk\"x,1,1\n"), ["line 2", "quotation mark", "text after"]),
+            ("scene,action,time,rmse\nhead,vtk,1,1\n".into(), ["line 1", "\"time\"", "known: scene"]),
+            ("scene,action,rmse\nhead,vtk,1\n".into(), ["line 1", "\"median_s\"", "needed"]),
+            ("scene,scene,action,median_s\n".into(), ["line 1", "\"scene\"", "twice"]),
+            ("scene,action,median_s,rmse,size\nhead,vtk,1,1,8x8\n".into(), ["line 2", "8x8", "2x2"]),
+            (String::new(), ["line 1", "no header", ""]),
         ] {
-            let message = joined(text).unwrap_err();
+            let message = joined(&text).unwrap_err();
             assert!(words.iter().all(|w| message.contains(w)), "{text:?}: {message}");
         }
     }

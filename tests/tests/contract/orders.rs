@@ -59,14 +59,6 @@ fn step_table_is_of_first_order_by_midpoints_and_of_second_pre_integrated() {
     assert!(found.iter().zip(&post).all(|(pre, post)| pre.1 < 0.5 * post.1), "{found:?} {post:?}");
 }
 
-/// Open: `cpu` tabulates pairs of values, and smears a step over one node of its table, all to one
-/// side. Below that width the error no longer falls.
-#[test]
-#[should_panic(expected = "pre-integrated order")]
-fn step_table_pre_integrated_by_cpu_is_of_second_order() {
-    between("pre-integrated order", order(&errors(&stepped_scene(), Setup::pre_integrated)), [1.7, 2.3]);
-}
-
 /// What `cpu` decides by itself is never worse than the worse of the two, and good where it counts.
 #[test]
 fn choosing_by_itself_gets_the_better_classification() {
