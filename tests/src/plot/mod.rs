@@ -75,7 +75,8 @@ impl Plot {
         let legend = self.legend_width();
         let rows = self.series.len() + usize::from(!self.front.is_empty());
         let height = (TOP + h + BELOW).max(TOP + ROW * rows as f64 + 12.0);
-        let width = LEFT + w + 16.0 + legend;
+        // Bold letters of 14 px are some 8.6 wide.
+        let width = (LEFT + w + 16.0 + legend).max(LEFT + 8.6 * self.title.chars().count() as f64);
         let mut out = String::new();
         _ = writeln!(
             out,

@@ -83,6 +83,7 @@ impl Scale {
                 let strong = match digit {
                     1 => power.rem_euclid(every) == 0,
                     2 | 5 => decades < 1.6,
+                    3 => decades < 1.0,
                     _ => decades < 0.5,
                 };
                 if (lo..=hi).contains(&log) && (strong || decades < 4.0) {

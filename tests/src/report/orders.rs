@@ -59,7 +59,10 @@ fn observed(expects: &Expected, study: Option<&Study>, checks: &[Check]) -> Stri
         (Expected::NoChange, None) => {
             let figures = checks.iter().filter_map(|c| c.figures.as_ref());
             let worst = figures.min_by(|a, b| a.room.total_cmp(&b.room));
-            worst.map_or(String::new(), |f| format!("{:.1e} of {:.1e}", f.max, f.max_tolerance))
+            worst.map_or(String::new(), |f| {
+                let found = if f.max == 0.0 { "0".into() } else { format!("{:.1e}", f.max) };
+                format!("{found} of {:.1e}", f.max_tolerance)
+            })
         }
         // Without a lattice: what was looked at is in the message.
         (Expected::Order { .. }, None) => if checks.is_empty() { "" } else { "exact" }.into(),
