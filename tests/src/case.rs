@@ -2,7 +2,7 @@
 
 use volact_core::{Caps, Compositing, Declaration, Registry};
 
-use crate::rig::Rig;
+use crate::{rig::Rig, study::Expected};
 
 /// Why a case ends early.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -85,6 +85,8 @@ pub struct Case {
     pub about: String,
     /// What an action must have.
     pub needs: Vec<Need>,
+    /// What is expected of an error, where the case is one of those that `volact verify` prints.
+    pub expects: Option<Expected>,
     run: Run,
 }
 
@@ -135,7 +137,21 @@ impl Topic {
         run: impl Fn(&mut Rig<'_>) -> Verdict + Send + Sync + 'static,
     ) {
         let needs = self.needs.iter().chain(needs).cloned().collect();
-        self.cases.push(Case { topic: self.name, name: name.into(), about: about.into(), needs, run: Box::new(run) });
+        self.cases.push(Case {
+            topic: self.name,
+            name: name.into(),
+            about: about.into(),
+            needs,
+            expects: None,
+            run: Box::new(run),
+        });
+    }
+
+    /// Says of the case listed last what it expects of an error.
+    pub fn expects(&mut self, expected: Expected) {
+        if let Some(case) = self.cases.last_mut() {
+            case.expects = Some(expected);
+        }
     }
 
     /// All listed.

@@ -20,7 +20,14 @@ pub struct Known {
 }
 
 /// All of them.
-pub const KNOWN: &[Known] = &[];
+pub const KNOWN: &[Known] = &[Known {
+    backend: "cpu",
+    driver: "",
+    case: "sampling::steps_in_tables_pre_integrated_are_of_second_order",
+    message: "wanted 2 (1.7 to 2.3)",
+    why: "pairs of values are tabulated, and a step is smeared over one node of the table, all to one side; below that \
+          width the error no longer falls",
+}];
 
 /// What a case comes to, knowing these.
 pub fn judge(known: &[Known], backend: &str, device: &str, case: &str, status: Status) -> Status {

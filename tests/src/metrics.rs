@@ -39,6 +39,17 @@ pub fn rms_error(a: &[[f64; 4]], b: &[[f64; 4]]) -> f64 {
     (differences(a, b).map(|d| d * d).sum::<f64>() / n as f64).sqrt()
 }
 
+/// The difference that a part of all pixels keeps, each in its worst channel.
+pub fn percentile_error(a: &[[f64; 4]], b: &[[f64; 4]], part: f64) -> f64 {
+    let each: Vec<f64> = differences(a, b).collect();
+    let worst = |d: &[f64; 4]| d.iter().fold(0.0, |m: f64, v| if v.is_nan() { f64::INFINITY } else { m.max(*v) });
+    let mut pixels: Vec<f64> = each.as_chunks::<4>().0.iter().map(worst).collect();
+    pixels.sort_by(f64::total_cmp);
+    let last = pixels.len().saturating_sub(1);
+    let at = ((part * pixels.len() as f64).ceil() as usize).saturating_sub(1).min(last);
+    pixels.get(at).copied().unwrap_or(0.0)
+}
+
 /// Whether two frames agree bit by bit, depth included.
 pub fn identical(a: &Frame, b: &Frame) -> bool {
     let bits = |f: &Frame| {
@@ -91,6 +102,15 @@ mod tests {
     fn order_of_a_power_is_its_exponent() {
         let errors = [1.0, 0.5, 0.25, 0.125].map(|h: f64| (h, 3.0 * h.powf(1.5)));
         assert!((order(&errors) - 1.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_percentile_is_kept_by_its_part_of_the_pixels() {
+        let zero = vec![[0.0; 4]; 200];
+        let found: Vec<_> = (0..200).map(|i| [0.0, f64::from(i), 0.0, 0.5]).collect();
+        assert_eq!(percentile_error(&found, &zero, 0.99), 197.0);
+        assert_eq!(percentile_error(&found, &zero, 1.0), 199.0);
+        assert_eq!(percentile_error(&found[..1], &zero[..1], 0.99), 0.5);
     }
 
     #[test]

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::study::{Expected, Study};
+
 /// A picture of a check: premultiplied RGBA, row by row from the top.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Sheet {
@@ -40,7 +42,7 @@ pub struct Figures {
 }
 
 /// One thing that was looked at.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Check {
     /// What.
     pub label: String,
@@ -54,6 +56,9 @@ pub struct Check {
     pub figures: Option<Figures>,
     /// Its pictures.
     pub sheet: Option<Sheet>,
+    /// How an error falls, where that was looked at.
+    #[serde(default)]
+    pub study: Option<Study>,
     /// How the frame says it was made.
     pub method: Option<String>,
     /// The scene, in the words of a scene file where it can be one.
@@ -110,6 +115,9 @@ pub struct CaseResult {
     pub about: String,
     /// What an action must have.
     pub needs: Vec<String>,
+    /// What is expected of an error, where the case is about that.
+    #[serde(default)]
+    pub expects: Option<Expected>,
     /// What it came to.
     pub status: Status,
     /// What was looked at.

@@ -28,6 +28,8 @@ const ALLOWED: &[(&str, &str, &str)] = &[
     ("reference", "sampling::ends_of_rays_are_bounded", "no option \"termination\""),
     ("reference", "sampling::skipping_changes_no_bit", "no option \"skipping\""),
     // Where built-in shaders are evaluated, too.
+    ("cpu", "sampling::pre_integration_is_of_second_order", "evaluated in the middle of segments"),
+    ("cpu", "sampling::steps_in_tables_pre_integrated_are_of_second_order", "evaluated in the middle of segments"),
     ("cpu", "formats::offset_f64_at_1e7", "evaluated in single precision"),
     ("cpu", "formats::offset_u32_at_4e9", "evaluated in single precision"),
     ("cpu", "tables::pre_interpolated", "pre-interpolated table in shader"),

@@ -19,6 +19,7 @@ pub fn cases() -> Vec<Case> {
     data_rois(&mut topic);
     geometry_rois(&mut topic);
     nearest(&mut topic);
+    super::orders::over_grids(&mut topic);
     topic.done()
 }
 

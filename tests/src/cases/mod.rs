@@ -1,4 +1,5 @@
-//! The cases, a file a topic. [`crate::catalog`] lists them; `stock` is what they share.
+//! The cases, a file a topic. [`crate::catalog`] lists them; `stock` is what they share;
+//! `orders` lists into the topics whose promise it is.
 
 pub mod cameras;
 pub mod changes;
@@ -13,6 +14,7 @@ pub mod life;
 pub mod nan;
 pub mod opacity;
 pub mod opaque;
+pub mod orders;
 pub mod overlap;
 pub mod sampling;
 pub mod shaders;

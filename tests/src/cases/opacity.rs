@@ -11,6 +11,7 @@ use crate::{
     method::F32,
     rig::{How, Scene},
     scene::{along_y, colors, constant, greys, lut},
+    study::Expected,
 };
 
 /// Lists them.
@@ -131,5 +132,6 @@ fn variants(topic: &mut Topic) {
             let (a, b) = (rig.draw(&other, &How::step(0.4))?, rig.draw(&plain, &How::step(0.4))?);
             rig.alike("variant", &other, &a, &b)
         });
+        topic.expects(Expected::NoChange);
     }
 }

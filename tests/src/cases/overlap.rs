@@ -11,7 +11,11 @@ use crate::{
     meshes::{bent, corner, field},
     rig::{How, Scene},
     scene::{along_y, colors, constant, greys, look, lut, shaded, volume},
+    study::Expected,
 };
+
+/// Of numbers of a mesh beside samples of a volume.
+const SECOND: Expected = Expected::order(2.0, [1.5, 2.6]);
 
 /// Lists them.
 pub fn cases() -> Vec<Case> {
@@ -120,9 +124,10 @@ fn pictures(topic: &mut Topic) {
         "numbers of a mesh converge with the step",
         |rig| {
             let mesh = field(bent([3, 2, 3], DVec3::splat(5.0), 0.1), rule, warm(), 1.0);
-            rig.slope("order", &around([mesh, turned()]), &How::default(), &[0.4, 0.2, 0.1, 0.05], [1.5, 2.6])
+            rig.slope("order", &around([mesh, turned()]), &How::default(), &[0.4, 0.2, 0.1, 0.05], SECOND)
         },
     );
+    topic.expects(SECOND);
 }
 
 fn orders(topic: &mut Topic) {

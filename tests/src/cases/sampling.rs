@@ -2,19 +2,22 @@
 
 use volact_core::{Block, Camera, FrameDesc, ParameterType, ParameterValue, Shape, VolumeTexture, glam::DVec3};
 
-use super::stock::{PIXELS, around, shape, through, usual, warm};
+use super::{
+    orders,
+    stock::{PIXELS, around, shape, through, usual, warm},
+};
 use crate::{
     case::{Case, Need, Stop, Topic, Verdict},
     metrics::{max_error, wide},
     rig::{How, Rig, Scene},
-    scene::{along_y, cell, colors, greys, look, lut, one_ray, volume},
+    scene::{along_y, colors, greys, look, lut, one_ray, volume},
 };
 
 /// Lists them.
 pub fn cases() -> Vec<Case> {
     let mut topic = Topic::new("sampling", &[Need::Shader("lut")]);
     steps(&mut topic);
-    orders(&mut topic);
+    orders::over_steps(&mut topic);
     anchors(&mut topic);
     ends(&mut topic);
     parts(&mut topic);
@@ -42,49 +45,6 @@ fn steps(topic: &mut Topic) {
     topic.case("step_by_default", "what an action chooses by itself it says, and keeps to", |rig| {
         rig.lattice("picture", &around([shape()]), &How::bare()).map(|_| ())
     });
-}
-
-/// The slope of the error over the step, against the certified integral.
-fn orders(topic: &mut Topic) {
-    let steps = [0.5, 0.25, 0.125, 0.0625];
-    let smooth = || greys(&[(0.0, 0.2, 0.1), (1.0, 0.9, 0.9)]);
-    let one = move || {
-        let eye = DVec3::splat(0.5) + DVec3::new(9.0, -5.0, 3.0);
-        let camera = Camera::orthographic(eye, DVec3::splat(0.5), DVec3::Z, 0.7);
-        Scene::new([lut(&cell(), smooth(), 0.3)], FrameDesc::new(camera, 16, 16))
-    };
-    let needs = [Need::Option("sample_distance")];
-    let steps_of_a_cell = steps.map(|h| h / 2.0);
-    topic.needing(
-        &needs,
-        "midpoint_is_of_second_order",
-        "midpoint rule with the exact exponential: order 2",
-        move |rig| rig.slope("order", &one(), &How::default(), &steps_of_a_cell, [1.7, 2.4]),
-    );
-    let both = [Need::Option("sample_distance"), Need::Option("classification")];
-    topic.needing(
-        &both,
-        "pre_integration_is_of_second_order",
-        "pre-integrated with in-segment attenuation: order 2",
-        move |rig| rig.slope("order", &one(), &How::segments(1.0), &steps_of_a_cell, [1.7, 2.6]),
-    );
-    topic.needing(&needs, "pictures_converge", "a whole picture of several cells: order 2", move |rig| {
-        let table = colors(&[(0.0, [0.2, 0.4, 0.9], 0.02), (100.0, [1.0, 0.6, 0.2], 0.5)]);
-        let scene = around([lut(&usual(), table, 1.0)]);
-        rig.slope("order", &scene, &How::default(), &steps, [1.6, 2.5])
-    });
-    topic.needing(
-        &needs,
-        "steps_in_tables_are_of_first_order",
-        "a step in the table: midpoint about 1, and noisy",
-        |rig| {
-            let table = greys(&[(0.0, 0.2, 0.05), (0.4, 0.2, 0.05), (0.4, 0.9, 0.7), (1.0, 0.9, 0.7)]);
-            let eye = DVec3::splat(0.5) + DVec3::new(9.0, -5.0, 3.0);
-            let camera = Camera::orthographic(eye, DVec3::splat(0.5), DVec3::Z, 0.7);
-            let scene = Scene::new([lut(&cell(), table, 0.3)], FrameDesc::new(camera, 16, 16));
-            rig.slope("order", &scene, &How::default(), &[0.2, 0.1, 0.05, 0.025, 0.0125], [0.6, 1.5])
-        },
-    );
 }
 
 /// Segment k covers [kh, (k+1)h] from the eye, or from the plane through the world's origin.

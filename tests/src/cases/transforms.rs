@@ -10,6 +10,7 @@ use crate::{
     case::{Case, Need, Topic},
     rig::{How, Scene},
     scene::{look, lut, placed, shaded},
+    study::Expected,
 };
 
 /// Lists them.
@@ -120,6 +121,7 @@ fn scales(topic: &mut Topic) {
             shape.set_transform(DAffine3::from_scale(DVec3::splat(scale)));
             rig.lattice("picture", &around([shape]), &How::step(0.3 * scale)).map(|_| ())
         });
+        topic.expects(Expected::NoChange);
     }
     topic.case("far_away", "positions are f64 in descriptions and local after: a scene at 1e7 looks as at 0", |rig| {
         let far = DVec3::new(1e7, -2e7, 3e6);

@@ -1,5 +1,7 @@
-//! What a run writes: a JSON a case with its scenes, and one page that opens offline.
+//! What a run writes: a JSON a case with its scenes, and one page that opens offline; and what other pages
+//! are made with.
 
+mod orders;
 mod page;
 mod picture;
 
@@ -11,8 +13,11 @@ use std::{
 use thiserror::Error;
 
 use crate::outcome::{CaseResult, Run};
+pub use crate::rig::line as method;
 
-pub use page::html;
+pub use orders::{OrderRow, control_rows, orders, write_orders};
+pub use page::{filled, html};
+pub use picture::{decades, over_black};
 
 /// Tolerance over difference above which a tolerance needs a reason.
 pub const LOOSE: f64 = 10.0;
@@ -103,7 +108,10 @@ pub fn write_html(path: &Path, runs: &[Run]) -> Result<(), ReportError> {
 }
 
 /// Writes a file whole or not at all.
-fn write(path: &Path, bytes: &[u8]) -> Result<(), ReportError> {
+///
+/// # Errors
+/// If it cannot be written.
+pub fn write(path: &Path, bytes: &[u8]) -> Result<(), ReportError> {
     let failed = |source| ReportError::Write { path: path.into(), source };
     if let Some(folder) = path.parent().filter(|p| !p.as_os_str().is_empty()) {
         fs::create_dir_all(folder).map_err(failed)?;
@@ -118,7 +126,7 @@ fn write(path: &Path, bytes: &[u8]) -> Result<(), ReportError> {
 }
 
 /// A name that any file system takes.
-fn slug(text: &str) -> String {
+pub fn slug(text: &str) -> String {
     let good = |c: char| if c.is_ascii_alphanumeric() || "._-=".contains(c) { c } else { '_' };
     text.chars().map(good).collect()
 }

@@ -9,6 +9,17 @@ use crate::outcome::{Check, Run};
 
 const TEMPLATE: &str = include_str!("page.html");
 
+/// What all pages have: colours by day and night, texts and tables.
+const STYLE: &str = include_str!("style.css");
+
+/// A page out of its template, with the style of all pages and its data. The data come last: what they
+/// hold is not looked at for places.
+pub fn filled(template: &str, data: &Value) -> String {
+    // `</script>` in a text would end the data.
+    let data = data.to_string().replace("</", "<\\/");
+    template.replacen("/*STYLE*/", STYLE, 1).replacen("/*DATA*/", &data, 1)
+}
+
 /// One HTML file that needs no other.
 ///
 /// # Errors
@@ -16,8 +27,7 @@ const TEMPLATE: &str = include_str!("page.html");
 pub fn html(runs: &[Run]) -> Result<String, ReportError> {
     let runs = runs.iter().map(run).collect::<Result<Vec<_>, _>>()?;
     let data = json!({ "loose": LOOSE, "floor": FLOOR, "runs": runs });
-    // `</script>` in a text would end the data.
-    Ok(TEMPLATE.replace("/*DATA*/", &data.to_string().replace("</", "<\\/")))
+    Ok(filled(TEMPLATE, &data))
 }
 
 fn run(run: &Run) -> Result<Value, ReportError> {
@@ -84,6 +94,7 @@ mod tests {
             name: "one".into(),
             about: "a </script> in a text".into(),
             needs: vec!["shader lut".into()],
+            expects: None,
             status: Status::Passed,
             checks: Vec::new(),
             seconds: 0.1,

@@ -13,12 +13,46 @@ pub fn all(sheet: &Sheet) -> Result<[String; 3], ReportError> {
     Ok([encode(plain(&sheet.expected))?, encode(plain(&sheet.actual))?, encode(heat)?])
 }
 
+/// A premultiplied colour as it looks over black.
 fn shown([r, g, b, _]: [f32; 4]) -> [u8; 3] {
     // NaN is magenta: nothing else is.
     if [r, g, b].iter().any(|v| v.is_nan()) {
         return [255, 0, 255];
     }
     [r, g, b].map(|v| (v.clamp(0.0, 1.0) * 255.0).round() as u8)
+}
+
+/// A premultiplied picture over black, as a data URL.
+///
+/// # Errors
+/// If it cannot be encoded.
+pub fn over_black(width: usize, height: usize, pixels: &[[f32; 4]]) -> Result<String, ReportError> {
+    encode(width, height, &pixels.iter().flat_map(|p| shown(*p)).collect::<Vec<u8>>())
+}
+
+/// Powers of ten of an error that have a colour: from black to white.
+const DECADES: [f64; 2] = [-7.0, 0.0];
+
+/// How far two pictures lie apart, pixel by pixel in the worst channel, by powers of ten from 1e-7 to 1.
+///
+/// # Errors
+/// If it cannot be encoded.
+pub fn decades(width: usize, height: usize, a: &[[f64; 4]], b: &[[f64; 4]]) -> Result<String, ReportError> {
+    let color = |(a, b): (&[f64; 4], &[f64; 4])| {
+        let off = (0..4).map(|c| (a[c] - b[c]).abs());
+        let off = off.fold(0.0f64, |m, d| if d.is_nan() { f64::INFINITY } else { m.max(d) });
+        ramp(((off.max(1e-300).log10() - DECADES[0]) / (DECADES[1] - DECADES[0])).clamp(0.0, 1.0))
+    };
+    encode(width, height, &a.iter().zip(b).flat_map(color).collect::<Vec<u8>>())
+}
+
+/// Black, blue, teal, orange, white.
+fn ramp(t: f64) -> [u8; 3] {
+    const STOPS: [[f64; 3]; 5] =
+        [[0.0, 0.0, 0.0], [20.0, 40.0, 120.0], [40.0, 160.0, 170.0], [240.0, 110.0, 20.0], [255.0, 255.0, 230.0]];
+    let at = t * (STOPS.len() - 1) as f64;
+    let i = (at as usize).min(STOPS.len() - 2);
+    [0, 1, 2].map(|c| (STOPS[i][c] + (at - i as f64) * (STOPS[i + 1][c] - STOPS[i][c])).round() as u8)
 }
 
 /// Difference over tolerance of a pixel.
@@ -42,6 +76,7 @@ fn heat(ratio: f32) -> [u8; 3] {
     }
 }
 
+/// A data URL of a PNG of RGB bytes.
 fn encode(width: usize, height: usize, rgb: &[u8]) -> Result<String, ReportError> {
     let failed = |source| ReportError::Picture { width, height, source };
     let mut bytes = Vec::new();

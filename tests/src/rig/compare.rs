@@ -9,7 +9,7 @@ use super::{How, Rig, Scene, line};
 use crate::{
     case::Stop,
     method::Lattice,
-    metrics::{identical, order, rms_error, wide},
+    metrics::{identical, rms_error, wide},
     outcome::{Check, Figures, Sheet},
     report::VARIANT,
     reproduce,
@@ -111,6 +111,7 @@ impl Rig<'_> {
             message,
             figures: None,
             sheet,
+            study: None,
             method: Some(line(&found.method)),
             scene: Some(reproduce::scene(&scene.shapes, &scene.desc)),
             files: reproduce::files(&scene.shapes),
@@ -128,44 +129,6 @@ impl Rig<'_> {
         tolerance.pixels.iter_mut().for_each(|t| *t *= 2.0);
         tolerance.parts.push(("twice, since both round".into(), 2.0));
         self.compare(label, VARIANT, scene, found, &wide(wanted), &tolerance);
-        Ok(())
-    }
-
-    /// The error against the certified integral falls with the step as a power between these.
-    ///
-    /// # Errors
-    /// If the steps cannot be drawn, or the action does not follow them (a skip).
-    pub fn slope(
-        &mut self,
-        label: &str,
-        scene: &Scene,
-        how: &How,
-        steps: &[f64],
-        [lo, hi]: [f64; 2],
-    ) -> Result<(), Stop> {
-        if !self.subject.has("sample_distance") || self.subject.options.contains_key("sample_distance") {
-            return Err(Stop::Skip("the step cannot be set: no option \"sample_distance\", or set by the user".into()));
-        }
-        let truth = self.truth(label, scene, Lattice::Exact, &Change::default())?;
-        let mut errors = Vec::new();
-        for &step in steps {
-            let frame = self.draw(scene, &how.clone().with("sample_distance", step))?;
-            errors.push((step, rms_error(&wide(&frame), &truth.color)));
-            if frame.method.sample_distance == 0.0 {
-                // No lattice: the error is rounding at any step.
-                let (found, wanted) = (errors.last().map_or(0.0, |e| e.1), 1e-6);
-                self.holds(
-                    label,
-                    found <= wanted,
-                    &format!("without a lattice the error is {found:.1e}, wanted {wanted:e}"),
-                );
-                return Ok(());
-            }
-        }
-        let slope = if errors.iter().all(|e| e.1 > 0.0 && e.1.is_finite()) { order(&errors) } else { f64::NAN };
-        let listed: Vec<_> = errors.iter().map(|(h, e)| format!("{e:.2e} at {h}")).collect();
-        let message = format!("order {slope:.2}, wanted {lo} to {hi}: {}", listed.join(", "));
-        self.claim(label, "slope against the certified integral", lo <= slope && slope <= hi, &message, Some(scene));
         Ok(())
     }
 
@@ -208,7 +171,7 @@ impl Rig<'_> {
         self.claim(label, "the error of the contract", passed, &message, None);
     }
 
-    fn claim(&mut self, label: &str, truth: &str, passed: bool, message: &str, scene: Option<&Scene>) {
+    pub(super) fn claim(&mut self, label: &str, truth: &str, passed: bool, message: &str, scene: Option<&Scene>) {
         self.note(Check {
             label: label.into(),
             truth: truth.into(),
@@ -216,6 +179,7 @@ impl Rig<'_> {
             message: message.into(),
             figures: None,
             sheet: None,
+            study: None,
             method: None,
             scene: scene.map(|s| reproduce::scene(&s.shapes, &s.desc)),
             files: scene.map(|s| reproduce::files(&s.shapes)).unwrap_or_default(),
@@ -305,6 +269,7 @@ impl Rig<'_> {
             message,
             figures,
             sheet,
+            study: None,
             method: Some(line(&frame.method)),
             scene: Some(reproduce::scene(&scene.shapes, &scene.desc)),
             files: reproduce::files(&scene.shapes),

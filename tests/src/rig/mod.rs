@@ -5,6 +5,7 @@
 
 mod compare;
 mod how;
+mod orders;
 mod setup;
 
 use std::collections::BTreeSet;
@@ -127,7 +128,7 @@ pub fn stop(error: &ActionError) -> Stop {
 }
 
 /// A frame's method on a line.
-fn line(method: &Method) -> String {
+pub fn line(method: &Method) -> String {
     format!(
         "{}; step {}; {}; table {}; format {}; filter {}; blend {}; termination {:.2e}; {}",
         method.sampling,

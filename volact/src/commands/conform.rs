@@ -93,7 +93,7 @@ impl Args {
                 bail!("no topic is called {topic:?}{hint}; known: {all}");
             }
         }
-        Ok(Filter { topics: self.topics.clone(), cases: self.cases.clone() })
+        Ok(Filter { topics: self.topics.clone(), cases: self.cases.clone(), studies: false })
     }
 }
 

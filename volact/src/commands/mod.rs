@@ -3,6 +3,7 @@
 
 pub mod bare;
 pub mod bench;
+pub mod chart;
 pub mod compare;
 pub mod completions;
 pub mod conform;
@@ -16,6 +17,7 @@ pub mod render;
 pub mod report;
 pub mod settings;
 pub mod source;
+pub mod verify;
 pub mod watch;
 
 use std::{
@@ -43,8 +45,12 @@ pub enum Command {
     Compare(compare::Args),
     /// Hold an action to the contract, with a report
     Conform(conform::Args),
+    /// Compare expected and observed orders of accuracy of an action
+    Verify(verify::Args),
     /// Measure how fast a scene is drawn
     Bench(bench::Args),
+    /// Chart error against time, of every action over what its options offer
+    Chart(chart::Args),
     /// Print completions for a shell
     Completions(completions::Args),
 }
@@ -73,7 +79,9 @@ impl Command {
             },
             Self::Compare(args) => compare::run(args, &registry),
             Self::Conform(args) => conform::run(args, &registry),
+            Self::Verify(args) => verify::run(args, &registry),
             Self::Bench(args) => bench::run(args, &registry),
+            Self::Chart(args) => chart::run(args, &registry),
             Self::Completions(args) => completions::run(args, &registry),
         }
     }
@@ -82,13 +90,14 @@ impl Command {
 impl Command {
     /// Registers the shaders of the config's folders, and those beside the scene.
     fn load_shaders(&self, registry: &mut volact::Registry) -> anyhow::Result<()> {
-        let (named, scene) = match self {
-            Self::Render(args) => (args.config(), args.scene()),
-            Self::Bench(args) => (args.config(), args.scene()),
-            Self::Describe(_) => (None, None),
+        let (named, scenes) = match self {
+            Self::Render(args) => (args.config(), Vec::from_iter(args.scene())),
+            Self::Bench(args) => (args.config(), Vec::from_iter(args.scene())),
+            Self::Chart(args) => (args.config(), args.scenes().collect()),
+            Self::Describe(_) => (None, Vec::new()),
             _ => return Ok(()),
         };
-        for folder in shader_folders(&settings::config(named)?, scene) {
+        for folder in shader_folders(&settings::config(named)?, &scenes) {
             volact::shaders::add_folder(registry, &folder)?;
         }
         Ok(())
@@ -100,6 +109,8 @@ impl Command {
             Self::Render(args) => args.config(),
             Self::Bench(args) => args.config(),
             Self::Conform(args) => args.config(),
+            Self::Verify(args) => args.config(),
+            Self::Chart(args) => args.config(),
             Self::Info(_) | Self::Describe(_) | Self::Plugins(_) => None,
             Self::Compare(_) | Self::Completions(_) => return Ok(None),
         };
@@ -108,13 +119,14 @@ impl Command {
     }
 }
 
-/// Where shaders are: the config's folders, and that of the scene.
-fn shader_folders(config: &Config, scene: Option<&Path>) -> Vec<PathBuf> {
+/// Where shaders are: the config's folders, and those of the scenes.
+fn shader_folders(config: &Config, scenes: &[&Path]) -> Vec<PathBuf> {
     let mut folders = config.shader_folders.clone();
-    match scene.and_then(Path::parent) {
-        Some(beside) if beside.as_os_str().is_empty() => folders.push(".".into()),
-        Some(beside) if beside.is_dir() => folders.push(beside.into()),
-        _ => {}
+    for beside in scenes.iter().filter_map(|scene| scene.parent()) {
+        let beside = if beside.as_os_str().is_empty() { Path::new(".") } else { beside };
+        if beside.is_dir() && !folders.iter().any(|folder| folder == beside) {
+            folders.push(beside.into());
+        }
     }
     folders
 }

@@ -31,6 +31,17 @@ impl Line {
     }
 }
 
+impl Line {
+    /// Shows what is done now, and how many of how many were.
+    pub fn count(&self, what: &str, done: u64, total: u64) {
+        if let Some((bar, message)) = lock().as_mut() {
+            what.clone_into(message);
+            bar.set_message(message.clone());
+            measure(bar, done, total, "{spinner} {msg} {bar:30} {pos} of {len}, {eta} left");
+        }
+    }
+}
+
 impl Progress for Line {
     fn advance(&self, done: u64, total: u64) -> bool {
         if let Some((bar, _)) = lock().as_ref() {

@@ -21,7 +21,7 @@ use super::{
 };
 
 /// Arguments that say what to draw and how; shared by commands that draw.
-#[derive(clap::Args)]
+#[derive(clap::Args, Default)]
 #[group(skip)]
 pub struct Args {
     /// A scene (.ron), or bare data: a volume (a file, or a folder with a series), mesh or surface

@@ -99,7 +99,9 @@ impl<'a> Session<'a> {
         }
         roots.extend(settings::config_file(source.config.clone()).map(Root::File));
         match settings::config(source.config.clone()) {
-            Ok(config) => roots.extend(shader_folders(&config, self.args.scene()).into_iter().map(Root::Shaders)),
+            Ok(config) => {
+                roots.extend(shader_folders(&config, &Vec::from_iter(self.args.scene())).into_iter().map(Root::Shaders))
+            }
             Err(_) => roots.extend(self.roots.iter().filter(|root| matches!(root, Root::Shaders(_))).cloned()),
         }
         self.roots = roots;
@@ -145,7 +147,7 @@ impl<'a> Session<'a> {
     fn registry(&self) -> anyhow::Result<Registry> {
         let mut registry = self.registry.clone();
         let config = settings::config(self.args.config())?;
-        for folder in shader_folders(&config, self.args.scene()) {
+        for folder in shader_folders(&config, &Vec::from_iter(self.args.scene())) {
             volact::shaders::add_folder(&mut registry, &folder)?;
         }
         Ok(registry)
