@@ -118,8 +118,10 @@ fn lines_of(text: &str) -> Result<Vec<Line>, (usize, String)> {
         ReaderBuilder::new().has_headers(false).flexible(true).trim(Trim::All).from_reader(text.as_bytes());
     let mut lines = Vec::new();
     // A record begins with the empty lines before it.
-    let empty =
-        |at: u64| text[at as usize..].bytes().take_while(|b| b"\r\n".contains(b)).filter(|b| *b == b'\n').count();
+    let empty = |at: u64| {
+        let rest = text.as_bytes().get(at as usize..).unwrap_or_default();
+        rest.iter().take_while(|b| b"\r\n".contains(b)).filter(|b| **b == b'\n').count()
+    };
     let line = |p: Option<&csv::Position>| p.map_or(1, |p| p.line() as usize + empty(p.byte()));
     for record in reader.records() {
         let record = record.map_err(|error| (line(error.position()), error.to_string()))?;
