@@ -49,9 +49,12 @@ fn beaten_by_none(scene: &SceneChart, measure: Measure) -> Vec<usize> {
     front(&places).into_iter().map(|i| placed[i]).collect()
 }
 
+/// Points by their number and place.
+type Members = Vec<(usize, [f64; 2])>;
+
 fn plot(scene: &SceneChart, measure: Measure, machines: bool) -> Plot {
     let mut actions: Vec<&str> = Vec::new();
-    let mut groups: BTreeMap<(usize, String), Vec<(usize, [f64; 2])>> = BTreeMap::new();
+    let mut groups: BTreeMap<(usize, String), Members> = BTreeMap::new();
     for (i, point) in scene.points.iter().enumerate() {
         let Some(at) = place(point, measure) else { continue };
         let form = actions.iter().position(|a| *a == point.action).unwrap_or_else(|| {

@@ -111,8 +111,11 @@ fn quoted(cell: &str) -> String {
     if cell.contains(['"', ',', '\n', '\r']) { format!("\"{}\"", cell.replace('"', "\"\"")) } else { cell.into() }
 }
 
+/// A line's number, from 1, and its cells; or what is wrong there.
+type Numbered<T> = (usize, T);
+
 /// The lines of a table, each with its number and its cells (RFC 4180; blanks around cells do not count).
-fn cells(text: &str) -> Result<Vec<(usize, Vec<String>)>, (usize, String)> {
+fn cells(text: &str) -> Result<Vec<Numbered<Vec<String>>>, Numbered<String>> {
     let (mut lines, mut cells, mut cell) = (Vec::new(), Vec::new(), String::new());
     let (mut line, mut start, mut within, mut was_quoted) = (1, 1, false, false);
     let mut chars = text.chars().chain(std::iter::once('\n')).peekable();
@@ -279,10 +282,10 @@ mod tests {
     fn joined(text: &str) -> Result<Chart, String> {
         let mut file = std::env::temp_dir();
         file.push(format!("volact-join-{}-{:?}.csv", std::process::id(), std::thread::current().id()));
-        std::fs::write(&file, text).unwrap();
+        fs::write(&file, text).unwrap();
         let mut chart = chart(Vec::new());
         let result = join(&mut chart, &file).map_err(|e| crate::truth::chain(&e));
-        std::fs::remove_file(&file).unwrap();
+        fs::remove_file(&file).unwrap();
         result.map(|_| chart)
     }
 
