@@ -27,7 +27,7 @@ pub fn all() -> Result<()> {
 /// The conformance suite on the project's own actions, and on faults made in them.
 pub fn conformance() -> Result<()> {
     cargo(&["test", "-p", "volact-conformance", "--test", "conformance"], &[])?;
-    let faults = ["--features", "mutations", "--test", "mutations", "--", "--nocapture"];
+    let faults = ["--features", "mutations", "--test", "mutations", "--test", "orders", "--", "--nocapture"];
     cargo(&[&["test", "-p", "volact-conformance"][..], &faults].concat(), &[])
 }
 

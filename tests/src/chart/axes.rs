@@ -55,13 +55,18 @@ pub struct Setting {
 impl Setting {
     /// Series and step.
     pub fn label(&self) -> String {
-        self.step.map_or(self.series.clone(), |h| format!("{} at {}", self.series, rounded(h)))
+        label(&self.series, self.step)
     }
 
     /// All options in words.
     pub fn words(&self) -> BTreeMap<String, String> {
         self.options.iter().map(|(name, value)| (name.clone(), word(value))).collect()
     }
+}
+
+/// Series and step in words.
+pub fn label(series: &str, step: Option<f64>) -> String {
+    step.map_or(series.to_owned(), |h| format!("{series} at {}", rounded(h)))
 }
 
 /// Four digits of a step, whatever its size.

@@ -10,7 +10,7 @@ use volact_core::{ActionError, Frame, Registry, RenderAction};
 
 use super::{
     Point,
-    axes::Setting,
+    axes::{self, Setting},
     rows::{Row, Rows, RowsError},
     truth::Truth,
 };
@@ -70,7 +70,7 @@ pub fn measure(
 ) -> Result<bool, RowsError> {
     let keyed: Vec<_> = settings.iter().enumerate().map(|(i, s)| (i, s, key(job, s))).collect();
     let open: Vec<_> = keyed.into_iter().filter(|(.., key)| !rows.has(key)).collect();
-    let mut seen = Vec::new();
+    let mut seen = Seen::of(rows);
     for batch in open.chunks(job.effort.together.max(1)) {
         let mut runs = Vec::new();
         for (i, setting, key) in batch {
@@ -104,12 +104,37 @@ struct Run<'a> {
     frame: Frame,
 }
 
-/// A picture that was drawn: one more of it is no news.
+/// A frame that was drawn: one more of it is no news.
 struct Seen {
     action: String,
     label: String,
-    method: String,
-    bits: Vec<[u32; 4]>,
+    content: String,
+}
+
+impl Seen {
+    /// Those of an earlier run.
+    fn of(rows: &Rows) -> Vec<Self> {
+        let seen = |row: &Row| match row {
+            Row::Point(p) => {
+                let (action, content) = (p.action.clone(), p.content.clone());
+                Some(Self { action, label: axes::label(&p.series, p.step), content })
+            }
+            Row::LeftOut { .. } => None,
+        };
+        rows.rows.iter().filter_map(seen).collect()
+    }
+}
+
+/// Scene, method and bits of a frame.
+fn content(job: Job<'_>, frame: &Frame) -> String {
+    let mut hash = Sha256::new();
+    hash.update(format!("{} {}", job.truth.key, report::method(&frame.method)));
+    frame.color.iter().flatten().for_each(|v| hash.update(v.to_bits().to_le_bytes()));
+    hex(&hash.finalize())
+}
+
+fn hex(digest: &[u8]) -> String {
+    digest.iter().take(16).map(|b| format!("{b:02x}")).collect()
 }
 
 /// The first frame, and those that warm up; why there is none.
@@ -119,13 +144,11 @@ fn start<'a>(job: Job<'_>, setting: &'a Setting, key: &'a str, seen: &mut Vec<Se
     let began = Instant::now();
     let frame = caught(|| draw(&mut *action, &job.scene.shapes, &job.scene.desc))?;
     let first = began.elapsed();
-    let method = report::method(&frame.method);
-    let bits: Vec<_> = frame.color.iter().map(|c| c.map(f32::to_bits)).collect();
-    let same = |s: &&Seen| s.action == setting.action && s.method == method && s.bits == bits;
-    if let Some(known) = seen.iter().find(same) {
+    let content = content(job, &frame);
+    if let Some(known) = seen.iter().find(|s| s.action == setting.action && s.content == content) {
         return Err(format!("the same method and the same bits as {}", known.label));
     }
-    seen.push(Seen { action: setting.action.clone(), label: setting.label(), method, bits });
+    seen.push(Seen { action: setting.action.clone(), label: setting.label(), content });
     let mut run = Run { key, setting, action, first, times: Vec::new(), frame };
     for _ in 0..job.effort.warm_up {
         if run.first > job.effort.each {
@@ -183,6 +206,7 @@ fn point(job: Job<'_>, run: &Run<'_>) -> Point {
     let truth = &job.truth.color;
     Point {
         key: run.key.into(),
+        content: content(job, frame),
         machine: job.machine.into(),
         action: run.setting.action.clone(),
         series: run.setting.series.clone(),
@@ -225,7 +249,7 @@ fn caught<T>(call: impl FnOnce() -> Result<T, ActionError>) -> Result<T, String>
 pub fn key(job: Job<'_>, setting: &Setting) -> String {
     let words =
         format!("{} {} {} {:?} {}", job.truth.key, job.machine, setting.action, setting.words(), job.effort.frames);
-    Sha256::digest(words).iter().take(16).map(|b| format!("{b:02x}")).collect()
+    hex(&Sha256::digest(words))
 }
 
 #[cfg(test)]

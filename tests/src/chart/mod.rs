@@ -67,6 +67,9 @@ pub struct TruthNote {
 pub struct Point {
     /// What it is a measurement of, as a hash; empty for one that was measured elsewhere.
     pub key: String,
+    /// Scene, method and bits of its frame, as a hash; empty for one that was measured elsewhere.
+    #[serde(default)]
+    pub content: String,
     /// The machine.
     pub machine: String,
     /// The action, or another program.

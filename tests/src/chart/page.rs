@@ -42,9 +42,6 @@ fn place(point: &Point, measure: Measure) -> Option<[f64; 2]> {
     Some([point.median_s, measure.of(point)?.max(FLOOR)])
 }
 
-/// A point's number and place.
-type Placed = (usize, [f64; 2]);
-
 /// Numbers of the points on the front.
 fn beaten_by_none(scene: &SceneChart, measure: Measure) -> Vec<usize> {
     let placed: Vec<_> = (0..scene.points.len()).filter(|&i| place(&scene.points[i], measure).is_some()).collect();
@@ -52,10 +49,12 @@ fn beaten_by_none(scene: &SceneChart, measure: Measure) -> Vec<usize> {
     front(&places).into_iter().map(|i| placed[i]).collect()
 }
 
+/// Points by their number and place.
+type Members = Vec<(usize, [f64; 2])>;
+
 fn plot(scene: &SceneChart, measure: Measure, machines: bool) -> Plot {
     let mut actions: Vec<&str> = Vec::new();
-    // By the form of its action and its name a series, and there by its number where a point lies.
-    let mut groups: BTreeMap<(usize, String), Vec<Placed>> = BTreeMap::new();
+    let mut groups: BTreeMap<(usize, String), Members> = BTreeMap::new();
     for (i, point) in scene.points.iter().enumerate() {
         let Some(at) = place(point, measure) else { continue };
         let form = actions.iter().position(|a| *a == point.action).unwrap_or_else(|| {
