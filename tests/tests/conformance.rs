@@ -37,6 +37,7 @@ const ALLOWED: &[(&str, &str, &str)] = &[
 
 /// What actions on GPUs do not draw yet, or what they do not have: parts of reasons, of any case.
 const NOT_ON_GPUS: &[&str] = &[
+    "texture coordinates of the geometry",
     "evaluated in f32",
     "no option \"classification\"",
     "no option \"threads\"",
