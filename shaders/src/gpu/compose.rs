@@ -161,7 +161,13 @@ fn stage(
     }
     for (hook, entry, who) in HOOKED {
         let budget = if watched { LOOP_BUDGET / 2 } else { LOOP_BUDGET };
-        let function = dispatch(&mut merger, &mut import, (&stage, hook), (entry, budget), (&shapes, &|i: usize| who(kinds[i], planes)))?;
+        let function = dispatch(
+            &mut merger,
+            &mut import,
+            (&stage, hook),
+            (entry, budget),
+            (&shapes, &|i: usize| who(kinds[i], planes)),
+        )?;
         let handle = named(&stage, hook).ok_or_else(|| ComposeError::inner(format!("no hook {hook}")))?;
         let made = merger.module.functions.append(function, Span::UNDEFINED);
         import.substitute(handle, made);
