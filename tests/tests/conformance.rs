@@ -40,6 +40,7 @@ const ALLOWED: &[(&str, &str, &str)] = &[
 /// What actions on GPUs do not draw yet, or what they do not have: parts of reasons, of any case.
 const NOT_ON_GPUS: &[&str] = &[
     "evaluated in single precision",
+    "texture coordinates of the geometry",
     "no option \"classification\"",
     "no option \"threads\"",
     "no option \"skipping\"",

@@ -142,8 +142,15 @@ impl VulkanAction {
         let mut formats: Vec<String> = held.map(|h| h.encoding.name()).collect();
         formats.sort();
         formats.dedup();
+        let mut sampling = Vec::new();
+        if drawn.iter().any(|s| !is_surface(s)) || drawn.is_empty() {
+            sampling.push("planes along the view axis, midpoint lattice");
+        }
+        if drawn.iter().any(|s| is_surface(s)) {
+            sampling.push("nearest triangle");
+        }
         Method {
-            sampling: "planes along the view axis, midpoint lattice".into(),
+            sampling: sampling.join(", "),
             sample_distance: made.step.distance,
             classification: "shader evaluated in the middle of segments".into(),
             table_width: 0,

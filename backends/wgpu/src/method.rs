@@ -1,6 +1,7 @@
 //! What a frame says about how it was made.
 
 use volact_core::{Compositing, Method, ParameterValue, Warning, WarningCode, resolve::ResolvedShape};
+use volact_shaders::gpu::mesh::surface::is_surface;
 
 use crate::{
     device::Gpu,
@@ -23,12 +24,17 @@ pub fn method(drawn: &[&ResolvedShape], volumes: &Volumes, made: &Drawn, setting
     if drawn.iter().any(first) {
         classification.push("crossings found by the shader's values");
     }
+    let mut sampling = Vec::new();
+    if drawn.iter().any(|s| !is_surface(s)) || drawn.is_empty() {
+        sampling.push(if made.planes.is_some() { "planes along the view axis" } else { "ray casting" });
+        sampling.push("midpoint lattice");
+    }
+    if drawn.iter().any(|s| is_surface(s)) {
+        sampling.push("nearest triangle");
+    }
     let hardware = settings.hardware && held.iter().any(|h| h.filterable);
     Method {
-        sampling: match made.planes {
-            None => "ray casting, midpoint lattice".into(),
-            Some(_) => "slabs along the view axis, midpoint lattice".into(),
-        },
+        sampling: sampling.join(", "),
         sample_distance: made.step,
         classification: classification.join(", "),
         table_width: 0,

@@ -218,6 +218,7 @@ impl<'a> Cells<'a> {
         }
         Ok(Point {
             key: String::new(),
+            content: String::new(),
             series: if series.is_empty() { action.clone() } else { series },
             action,
             settings: (!settings.is_empty()).then(|| ("settings".to_owned(), settings)).into_iter().collect(),

@@ -244,7 +244,7 @@ fn what_is_not_drawn_is_refused_by_name() {
     let pre = table().pre_interpolated();
     assert_eq!(pre.interpolation(), TableInterpolation::Pre);
     let shapes = [
-        (Shape::around(&volume, Appearance::new("lut").with("lookup_table", pre)), "pre-interpolated table"),
+        (Shape::around(&volume, Appearance::new("gradient").with("lookup_table", pre)), "pre-interpolated table"),
         (Shape::around(&volume, lut().with("component", 3i64)), "component 3"),
     ];
     for (shape, words) in shapes {

@@ -10,7 +10,10 @@ use volact_core::{
     glam::{DAffine3, DVec3},
 };
 
-use crate::common::{draw, rays, slices};
+use crate::{
+    common::{draw, rays, slices},
+    meshes,
+};
 
 const STEP: f64 = 0.31;
 
@@ -34,7 +37,7 @@ fn scenes() -> Vec<Vec<Shape>> {
     let [a, b] = [lut_of(&texture, warm(), 1.0), lut(&ball([7, 9, 8], ScalarType::F32), warm(), 2.0)];
     b.set_transform(DAffine3::from_translation(DVec3::new(2.0, 1.0, 1.5)) * DAffine3::from_rotation_x(0.5));
     let mip = shaded("mip", &texture, warm(), 1.0);
-    vec![vec![a.clone()], vec![a, b, mip]]
+    vec![vec![a.clone()], vec![a, b, mip], meshes::of_every_kind()]
 }
 
 fn submissions(frame: &Frame) -> usize {
