@@ -122,7 +122,7 @@ fn convex_and_hollow_and_torn_meshes() {
     let visible: Vec<u8> = (0..6 * 5 * 7).map(|i| u8::from(i % 11 != 0)).collect();
     let torn = bent.clone().with_blanking(volact_core::Buffer::from_vec(visible)).unwrap();
     for desc in [view(), near()] {
-        agree("sphere", &[of(sphere.clone(), "lut")], &desc);
+        agree("sphere", &[of(sphere, "lut")], &desc);
         agree("bent grid", &[of(bent.clone(), "lut")], &desc);
         agree("torn grid", &[of(torn.clone(), "lut")], &desc);
         agree("tube", &[of(a_tube(), "lut")], &desc);
