@@ -31,6 +31,7 @@ pub mod scene;
 pub mod study;
 pub mod subject;
 pub mod tables;
+pub mod timed;
 pub mod tolerance;
 pub mod truth;
 pub mod voxels;

@@ -60,7 +60,7 @@ impl Subject {
 }
 
 /// A value as a user writes it.
-fn word(value: &ParameterValue) -> String {
+pub(crate) fn word(value: &ParameterValue) -> String {
     match value {
         ParameterValue::Choice(word) => word.clone(),
         ParameterValue::Bool(b) => b.to_string(),

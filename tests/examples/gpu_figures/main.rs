@@ -7,15 +7,10 @@
 
 mod probe;
 
-use std::{error::Error, time::Instant};
+use std::error::Error;
 
-use volact_core::{
-    Appearance, ControlPoint, Frame, FrameDesc, LookupTable, Options, ParameterValue, Registry, RenderAction,
-    ScalarType, Shape, View, Volume, VolumeDesc, glam::DVec3,
-};
-
-/// Scenes that see much, little, and only the front of a volume.
-const SCENES: [&str; 3] = ["haze", "shells", "solid"];
+use volact_conformance::timed::{SCENES, draw, table, volume};
+use volact_core::{Appearance, Frame, FrameDesc, Options, ParameterValue, Registry, Shape, View};
 
 /// Actions and options.
 const SETTINGS: [(&str, &[(&str, &str)]); 6] = [
@@ -26,37 +21,6 @@ const SETTINGS: [(&str, &[(&str, &str)]); 6] = [
     ("wgpu", &[("method", "slices")]),
     ("vulkan", &[]),
 ];
-
-/// Shells around the middle, waved, 8 bits.
-fn volume(size: usize) -> Result<Volume, Box<dyn Error>> {
-    let value = |i: usize| {
-        let at = [i % size, i / size % size, i / size / size].map(|v| v as f64 / (size - 1) as f64 - 0.5);
-        let p = DVec3::from_array(at);
-        let waves = 0.05 * ((20.0 * p.x).sin() * (17.0 * p.y).cos() + (23.0 * p.z).sin());
-        (255.0 * (1.0 - 1.6 * p.length() + waves)).clamp(0.0, 255.0) as u8
-    };
-    let bytes: Vec<u8> = (0..size * size * size).map(value).collect();
-    Ok(Volume::new(VolumeDesc::new([size; 3], ScalarType::U8, 1), bytes)?)
-}
-
-fn table(scene: &str) -> Result<LookupTable, Box<dyn Error>> {
-    let point = |value: f64, opacity: f64| ControlPoint { value, color: [value / 255.0, 0.5, 0.2], opacity };
-    let points = match scene {
-        "haze" => vec![point(0.0, 0.0005), point(255.0, 0.004)],
-        "shells" => vec![point(150.0, 0.0), point(155.0, 0.02), point(160.0, 0.0), point(254.0, 0.0)],
-        _ => vec![point(120.0, 0.0), point(130.0, 0.9), point(255.0, 0.9)],
-    };
-    Ok(LookupTable::from_points(points)?)
-}
-
-fn draw(action: &mut dyn RenderAction, shape: &Shape, desc: &FrameDesc) -> Result<(Frame, f64), Box<dyn Error>> {
-    let start = Instant::now();
-    action.manage(shape)?;
-    action.begin_draw(desc)?;
-    action.draw(shape)?;
-    let frame = action.end_draw()?;
-    Ok((frame, start.elapsed().as_secs_f64() * 1e3))
-}
 
 fn main() -> Result<(), Box<dyn Error>> {
     let numbers: Vec<String> = std::env::args().skip(1).collect();

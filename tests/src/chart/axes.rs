@@ -8,6 +8,8 @@ use std::collections::BTreeMap;
 
 use volact_core::{Declaration, Options, ParameterDecl, ParameterType, ParameterValue};
 
+use crate::subject::word;
+
 /// What varying an option changes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
@@ -73,17 +75,6 @@ pub fn label(series: &str, step: Option<f64>) -> String {
 fn rounded(step: f64) -> f64 {
     let unit = 10f64.powi(3 - step.log10().floor() as i32);
     (step * unit).round() / unit
-}
-
-/// A value as a user writes it.
-fn word(value: &ParameterValue) -> String {
-    match value {
-        ParameterValue::Choice(word) => word.clone(),
-        ParameterValue::Bool(b) => b.to_string(),
-        ParameterValue::Int(i) => i.to_string(),
-        ParameterValue::Float(f) => f.to_string(),
-        other => format!("{other:?}"),
-    }
 }
 
 /// All settings of an action: `given` options are not varied. Those with everything else as it is by
