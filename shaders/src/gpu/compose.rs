@@ -79,8 +79,8 @@ pub struct Composition {
 /// Composes the ray-casting stage for shapes: first those that are composited in depth, then those
 /// that are a picture each, in the order in which they are laid over. `spans` is the number of
 /// stretches that clips may leave of a ray; `planes` and `surfaces` tell that a shape may have slice planes,
-/// and that there are surfaces. A device that cuts loops short is `watched`: that it did is then in the flags, and authors' loops have half of
-/// their budget so that the two are told apart.
+/// and that there are surfaces. That a device has cut loops short is in the flags; one that is known to is
+/// `watched`: authors' loops have half of their budget there, so that the two are told apart.
 ///
 /// # Errors
 /// If something cannot be put together, which would be a fault of this crate.
@@ -152,12 +152,10 @@ fn stage(
     };
     let ends = if surfaces { SURFACES } else { NO_SURFACES };
     let stage = parse(&constants, &[&[HOOKS, ends], inside, texts].concat())?;
-    let watch = if watched { Some(merger.shared("volact_short")?) } else { None };
     let mut import = Import::new(&stage, "");
-    import.watch(watch);
     let mut shapes = Vec::new();
     for (number, recipe) in recipes.iter().enumerate() {
-        shapes.push(Shape::import(&mut merger, recipe, (number, watch), &layout.slots[number])?);
+        shapes.push(Shape::import(&mut merger, recipe, number, &layout.slots[number])?);
     }
     for (hook, entry, who) in HOOKED {
         let budget = if watched { LOOP_BUDGET / 2 } else { LOOP_BUDGET };
@@ -208,16 +206,10 @@ struct Shape {
 }
 
 impl Shape {
-    fn import(
-        merger: &mut Merger,
-        recipe: &Recipe,
-        (number, watch): (usize, Option<Handle<Function>>),
-        slots: &[Slot],
-    ) -> Result<Self, ComposeError> {
+    fn import(merger: &mut Merger, recipe: &Recipe, number: usize, slots: &[Slot]) -> Result<Self, ComposeError> {
         let program = &recipe.program;
         let mut import = Import::new(program.module(), format!("s{number}_"));
         import.guard(merger.shared("volact_round")?);
-        import.watch(watch);
         let parameters = &program.declaration().parameters;
         let unit = parameters.iter().position(|p| p.name == "unit_distance").map_or(0, |i| slots[i].row);
         let lengths =
@@ -246,7 +238,6 @@ impl Shape {
             None => format!("s{number}_"),
         };
         let mut imports: Vec<_> = accessors.iter().enumerate().map(|(i, a)| Import::new(a, prefix(i))).collect();
-        imports.iter_mut().for_each(|import| import.watch(watch));
         for (handle, _) in program.module().functions.iter() {
             let Some(stub) = program.stub(handle) else { continue };
             let (place, name) = match stub {

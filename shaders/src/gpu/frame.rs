@@ -37,7 +37,7 @@ pub struct FrameNumbers {
     pub termination: f32,
     pub infinity: f32,
     pub first_row: u32,
-    pub rest: u32,
+    pub probe: u32,
     pub surfaces: [u32; 2],
 }
 
@@ -118,6 +118,7 @@ impl Anchor {
             anchor: self.pixel.map(|v| v as f32),
             size: self.size,
             infinity: f32::INFINITY,
+            probe: 4,
             ..FrameNumbers::zeroed()
         }
     }

@@ -7,8 +7,8 @@
 use std::collections::{BTreeMap, HashMap};
 
 use naga::{
-    ArraySize, Block, Constant, Expression, Function, GlobalVariable, Handle, Literal, LocalVariable, Module, Scalar,
-    Span, Statement, SwitchCase, Type, TypeInner, UnaryOperator,
+    ArraySize, Block, Constant, Expression, Function, GlobalVariable, Handle, Module, Span, Statement, SwitchCase,
+    Type, TypeInner,
 };
 
 use super::ComposeError;
@@ -34,8 +34,6 @@ pub struct Import<'a> {
     globals: HashMap<Handle<GlobalVariable>, Handle<GlobalVariable>>,
     /// What every round of a loop asks whether to go on.
     guard: Option<Handle<Function>>,
-    /// What is told of a loop that ended without having been left.
-    watch: Option<Handle<Function>>,
 }
 
 impl<'a> Import<'a> {
@@ -49,7 +47,6 @@ impl<'a> Import<'a> {
             constants: HashMap::new(),
             globals: HashMap::new(),
             guard: None,
-            watch: None,
         }
     }
 
@@ -61,12 +58,6 @@ impl<'a> Import<'a> {
     /// Has loops ask a function, at the beginning of each round, whether to stop.
     pub fn guard(&mut self, by: Handle<Function>) {
         self.guard = Some(by);
-    }
-
-    /// Has a function called behind loops that end without having been left, by a device that cuts them
-    /// short.
-    pub fn watch(&mut self, by: Option<Handle<Function>>) {
-        self.watch = by;
     }
 }
 
@@ -143,11 +134,6 @@ impl Merger {
         self.block(import, &mut block)?;
         if let Some(guard) = import.guard {
             block = guarded(block, guard, &mut made);
-        }
-        if let Some(told) = import.watch {
-            let truth = Type { name: None, inner: TypeInner::Scalar(Scalar::BOOL) };
-            let truth = self.module.types.insert(truth, Span::UNDEFINED);
-            block = watched(block, (told, truth), &mut made, None);
         }
         made.body = block;
         self.predeclared(import)?;
@@ -303,76 +289,6 @@ impl Merger {
         }
         Ok(())
     }
-}
-
-/// The block with each loop noting whether it was left: by `break`, since who returns does not get
-/// behind it. `open` is where the loop around notes it.
-fn watched(
-    block: Block,
-    how: (Handle<Function>, Handle<Type>),
-    function: &mut Function,
-    open: Option<Handle<Expression>>,
-) -> Block {
-    let mut made = Block::with_capacity(block.len());
-    for (statement, span) in block.span_into_iter() {
-        let statement = match statement {
-            Statement::Block(inner) => Statement::Block(watched(inner, how, function, open)),
-            Statement::If { condition, accept, reject } => Statement::If {
-                condition,
-                accept: watched(accept, how, function, open),
-                reject: watched(reject, how, function, open),
-            },
-            Statement::Switch { selector, mut cases } => {
-                // What breaks there leaves the switch.
-                for case in &mut cases {
-                    case.body = watched(std::mem::take(&mut case.body), how, function, None);
-                }
-                Statement::Switch { selector, cases }
-            }
-            Statement::Loop { body, continuing, break_if } => {
-                watch(&mut made, (body, continuing, break_if), how, function);
-                continue;
-            }
-            Statement::Break => {
-                if let Some(pointer) = open {
-                    let no = function.expressions.append(Expression::Literal(Literal::Bool(false)), Span::UNDEFINED);
-                    made.push(Statement::Store { pointer, value: no }, Span::UNDEFINED);
-                }
-                Statement::Break
-            }
-            other => other,
-        };
-        made.push(statement, span);
-    }
-    made
-}
-
-/// A loop, and behind it the question whether it was left.
-fn watch(
-    made: &mut Block,
-    (body, mut continuing, break_if): (Block, Block, Option<Handle<Expression>>),
-    (told, truth): (Handle<Function>, Handle<Type>),
-    function: &mut Function,
-) {
-    let span = Span::UNDEFINED;
-    let local = function.local_variables.append(LocalVariable { name: None, ty: truth, init: None }, span);
-    let pointer = function.expressions.append(Expression::LocalVariable(local), span);
-    let yes = function.expressions.append(Expression::Literal(Literal::Bool(true)), span);
-    made.push(Statement::Store { pointer, value: yes }, span);
-    let body = watched(body, (told, truth), function, Some(pointer));
-    if let Some(condition) = break_if {
-        let start = function.expressions.len();
-        let not = Expression::Unary { op: UnaryOperator::LogicalNot, expr: condition };
-        let value = function.expressions.append(not, span);
-        continuing.push(Statement::Emit(function.expressions.range_from(start)), span);
-        continuing.push(Statement::Store { pointer, value }, span);
-    }
-    made.push(Statement::Loop { body, continuing, break_if }, span);
-    let start = function.expressions.len();
-    let condition = function.expressions.append(Expression::Load { pointer }, span);
-    made.push(Statement::Emit(function.expressions.range_from(start)), span);
-    let tell = Statement::Call { function: told, arguments: Vec::new(), result: None };
-    made.push(Statement::If { condition, accept: Block::from_vec(vec![tell]), reject: Block::new() }, span);
 }
 
 /// The block with its loops asking, each round, whether to go on; where not, the function returns

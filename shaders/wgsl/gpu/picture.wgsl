@@ -43,4 +43,5 @@ fn volact_picture(@builtin(global_invocation_id) id: vec3<u32>) {
         atomicAdd(&volact_flags[counter + 64u], 1u);
         atomicAdd(&volact_flags[counter + 129u], volact_skipped);
     }
+    volact_probe();
 }

@@ -72,8 +72,7 @@ fn volact_gather(run: vec4<i32>, whole: VolactRay) -> bool {
     return run.w != VOLACT_OPEN && (run.w & 31) == 0 && volact_left < volact_frame.termination;
 }
 
-@fragment
-fn volact_run(corner: VolactCorner) {
+fn volact_drawn(corner: VolactCorner) {
     let pixel = vec2<u32>(corner.place.xy);
     if pixel.x >= volact_frame.size.x || pixel.y >= volact_frame.size.y { return; }
     if pixel.y < volact_frame.first_row { return; }
@@ -121,4 +120,10 @@ fn volact_run(corner: VolactCorner) {
     }
     volact_light[at] = volact_color;
     volact_light[at + 1u] = vec4<f32>(volact_left, volact_depth, state, known.w + f32(volact_samples));
+}
+
+@fragment
+fn volact_run(corner: VolactCorner) {
+    volact_drawn(corner);
+    volact_probe();
 }

@@ -355,6 +355,34 @@ fn loops_within_the_budget_are_right() {
     }
 }
 
+/// A device that ends loops early, as llvmpipe does after 65,535 rounds, is an error, not another picture.
+#[test]
+fn loops_that_a_device_cuts_short_are_an_error() {
+    let _alone = alone();
+    let mut wanted = None;
+    for rounds in [10, 4_000, 12_000, 30_000] {
+        let (registry, shape) = written(&format!(
+            "fn shade(s: Sample) -> Medium {{
+                var n = 0u;
+                for (var i = 0u; i < {rounds}u; i++) {{ n += 1u; }}
+                return Medium(vec3<f32>(f32(n) / {rounds}.0), 0.1);
+            }}"
+        ));
+        let Some(drawn) = try_in(&registry, &shape, 0.3) else { return };
+        match drawn {
+            Ok(frame) => {
+                let found = frame.pixel(24, 20);
+                let first = *wanted.get_or_insert(found);
+                assert!(found[3] > 0.1 && found.iter().zip(first).all(|(a, b)| (a - b).abs() < 1e-4), "{found:?}");
+            }
+            Err(error) => {
+                assert!(error.to_string().contains("number of rounds of loops along a ray"), "{error}");
+                assert!(rounds > 1_000, "{rounds}");
+            }
+        }
+    }
+}
+
 /// What `select` knows an adapter that is no GPU by.
 #[test]
 fn software_says_that_it_is() {

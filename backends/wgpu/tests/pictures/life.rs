@@ -182,6 +182,54 @@ fn loops_within_the_budget_are_right() {
     assert!((middle[0] / middle[3] - 0.5).abs() < 1e-5, "{middle:?}");
 }
 
+/// A device that ends loops early, as llvmpipe does after 65,535 rounds, is an error, not another picture.
+#[test]
+fn loops_that_a_device_cuts_short_are_an_error() {
+    let text = |rounds: u32| {
+        format!(
+            "fn shade(s: Sample) -> Medium {{
+                var n = 0u;
+                for (var i = 0u; i < {rounds}u; i++) {{ n += 1u; }}
+                return Medium(vec3<f32>(f32(n) / {rounds}.0), 0.1);
+            }}"
+        )
+    };
+    let desc = square(DVec3::splat(12.0), DVec3::new(4.0, -9.0, 5.0), 36.0, 3);
+    let mut pictures = Vec::new();
+    for method in ["rays", "slices"] {
+        for rounds in [10, 1_000, 4_000, 12_000, 30_000] {
+            let (registry, shape) = looping(&text(rounds));
+            let mut action = rays(0.7).with("method", method).action_in(&registry);
+            let device = action.caps().device;
+            action.manage(&shape).unwrap();
+            match draw_managed(&mut *action, &[shape], &desc) {
+                Ok(frame) => pictures.push(frame.pixel(1, 1)),
+                Err(error) => {
+                    let told = told(&error);
+                    assert!(told.contains("number of rounds of loops along a ray"), "{told}");
+                    assert!(device.contains("llvmpipe") && rounds > 1_000, "{device}, {rounds} rounds");
+                }
+            }
+        }
+    }
+    let first = pictures[0];
+    assert!(first[3] > 0.5 && (first[0] / first[3] - 1.0).abs() < 1e-5, "{first:?}");
+    for found in pictures {
+        assert!(found.iter().zip(first).all(|(a, b)| (a - b).abs() < 1e-4), "{found:?}, wanted {first:?}");
+    }
+    // Many samples are as many rounds.
+    let shape = a_ball();
+    let wanted = draw(&rays(0.05), std::slice::from_ref(&shape), &desc).pixel(1, 1);
+    let mut action = rays(0.0005).action_in(&registry());
+    action.manage(&shape).unwrap();
+    match draw_managed(&mut *action, &[shape], &desc) {
+        Ok(frame) => {
+            assert!((frame.pixel(1, 1)[3] - wanted[3]).abs() < 1e-3, "{:?}, wanted {wanted:?}", frame.pixel(1, 1))
+        }
+        Err(error) => assert!(told(&error).contains("rounds of loops along a ray"), "{}", told(&error)),
+    }
+}
+
 #[test]
 fn what_cannot_be_is_refused_by_name() {
     let registry = registry();
