@@ -5,6 +5,8 @@
 //! relative to the whole, rounded outward. A query visits every box that the line meets, and now
 //! and then one that it misses: exact answers are for the caller to find.
 
+use std::ops::Range;
+
 use glam::DVec3;
 
 use crate::Aabb;
@@ -35,6 +37,17 @@ struct Node {
     link: u32,
     /// Items of a leaf, 0 for an inner node.
     count: u32,
+}
+
+/// A node as others see it who go through the tree themselves.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Visit {
+    /// The box around all items below it.
+    pub bounds: Aabb,
+    /// The node to go on with where the box is missed; where it is met, that is the next one.
+    pub skip: usize,
+    /// The places in [`Bvh::items`] of a leaf's items; empty for an inner node.
+    pub items: Range<usize>,
 }
 
 /// An item while the tree is made: the middle of its box, and its number.
@@ -78,6 +91,28 @@ impl Bvh {
     /// The bytes that it holds.
     pub fn bytes(&self) -> usize {
         self.nodes.capacity() * size_of::<Node>() + self.items.capacity() * size_of::<u32>()
+    }
+
+    /// The items, by their numbers, leaf by leaf.
+    pub fn items(&self) -> &[u32] {
+        &self.items
+    }
+
+    /// The nodes, depth first, for who goes through them without a stack: from one to the next where its box
+    /// is met, else to the one it says.
+    pub fn nodes(&self) -> Vec<Visit> {
+        // A subtree ends where that of its right child does, which lies behind it.
+        let mut ends = vec![0; self.nodes.len()];
+        for (at, node) in self.nodes.iter().enumerate().rev() {
+            ends[at] = if node.count > 0 { at + 1 } else { ends[node.link as usize] };
+        }
+        let absolute = |p: [f32; 3]| DVec3::from(p.map(f64::from)) * self.scale + self.center;
+        let visit = |(node, skip): (&Node, usize)| {
+            let first = if node.count > 0 { node.link as usize } else { 0 };
+            let bounds = Aabb::new(absolute(node.min), absolute(node.max));
+            Visit { bounds, skip, items: first..first + node.count as usize }
+        };
+        self.nodes.iter().zip(ends).map(visit).collect()
     }
 
     /// Visits every item whose box the line `origin + t·direction` meets for a `t` within `span`,
@@ -203,6 +238,20 @@ mod tests {
         found
     }
 
+    /// Items of leaves all of whose boxes hold a place, as found without a stack.
+    fn holding(tree: &Bvh, place: DVec3) -> Vec<u32> {
+        let (nodes, mut found, mut at) = (tree.nodes(), Vec::new(), 0);
+        while let Some(node) = nodes.get(at) {
+            let holds = node.bounds.min.cmple(place).all() && node.bounds.max.cmpge(place).all();
+            if holds {
+                found.extend(&tree.items()[node.items.clone()]);
+            }
+            at = if holds { at + 1 } else { node.skip };
+        }
+        found.sort_unstable();
+        found
+    }
+
     fn meets(b: &Aabb, origin: DVec3, direction: DVec3, span: [f64; 2]) -> bool {
         b.clip_line(origin, direction).is_some_and(|[t0, t1]| t0 <= span[1] && t1 >= span[0])
     }
@@ -244,6 +293,30 @@ mod tests {
         }
     }
 
+    proptest! {
+        #[test]
+        fn every_box_that_holds_a_place_is_found_without_a_stack(
+            boxes in prop::collection::vec([prop::array::uniform3(-9.0..9.0f64), prop::array::uniform3(-9.0..9.0f64)], 0..90),
+            place in prop::array::uniform3(-9.0..9.0f64),
+        ) {
+            let place = DVec3::from(place);
+            let boxes = boxes.iter().map(|&[a, b]| {
+                let (a, b) = (DVec3::from(a), DVec3::from(b));
+                Aabb::new(a.min(b), a.max(b))
+            });
+            let boxes: Vec<_> = boxes.collect();
+            let tree = Bvh::new(&boxes);
+            let found = holding(&tree, place);
+            prop_assert!(found.windows(2).all(|w| w[0] < w[1]), "{found:?}");
+            for (i, b) in (0..).zip(&boxes) {
+                let inside = b.min.cmple(place).all() && b.max.cmpge(place).all();
+                prop_assert!(!inside || found.contains(&i), "{i} {b:?}");
+            }
+            // No more nodes than items, but for one.
+            prop_assert!(tree.nodes().len() <= boxes.len().max(1));
+        }
+    }
+
     #[test]
     fn a_tree_over_nothing_is_empty() {
         for boxes in [vec![], vec![Aabb::EMPTY; 9]] {
@@ -259,6 +332,7 @@ mod tests {
         let tree = Bvh::new(&boxes);
         assert_eq!(visited(&tree, DVec3::ZERO, DVec3::ONE, [0.0, 2.0]).len(), 1000);
         assert!(visited(&tree, DVec3::ZERO, -DVec3::ONE, [0.0, 2.0]).is_empty());
+        assert_eq!(holding(&tree, DVec3::ONE).len(), 1000);
     }
 
     #[test]

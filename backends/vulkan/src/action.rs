@@ -9,13 +9,14 @@ use volact_core::{
 use volact_shaders::{
     Programs,
     gpu::{
+        action,
         mesh::surface::is_surface,
         scene::{Item, cut_short, overlapping, overrun},
     },
 };
 
 use crate::{
-    check::{self, NAME, check},
+    check::NAME,
     device::Gpu,
     draw::{Drawing, Drawn},
     options::{Settings, declaration},
@@ -139,22 +140,12 @@ impl VulkanAction {
             ParameterValue::Volume(texture) => self.drawing.volumes.get(texture.volume()),
             _ => None,
         });
-        let mut formats: Vec<String> = held.map(|h| h.encoding.name()).collect();
-        formats.sort();
-        formats.dedup();
-        let mut sampling = Vec::new();
-        if drawn.iter().any(|s| !is_surface(s)) || drawn.is_empty() {
-            sampling.push("planes along the view axis, midpoint lattice");
-        }
-        if drawn.iter().any(|s| is_surface(s)) {
-            sampling.push("nearest triangle");
-        }
         Method {
-            sampling: sampling.join(", "),
+            sampling: action::sampling(drawn, "planes along the view axis, midpoint lattice"),
             sample_distance: made.step.distance,
             classification: "shader evaluated in the middle of segments".into(),
             table_width: 0,
-            texture_format: formats.join(", "),
+            texture_format: action::formats(held.map(|h| h.encoding.name())),
             filter: if self.settings.hardware { "hardware" } else { "f32, exact weights" }.into(),
             blend: "f32".into(),
             termination: self.settings.termination,
@@ -169,7 +160,7 @@ impl RenderAction for VulkanAction {
     }
 
     fn caps(&self) -> Caps {
-        check::caps(&self.gpu.description())
+        action::caps(&self.gpu.description())
     }
 
     /// Takes a shape in and has its volumes moved to the device already, by the transfer queue.
@@ -177,7 +168,7 @@ impl RenderAction for VulkanAction {
         let programs = &self.programs;
         let mut found = None;
         self.lifecycle.manage(shape, |shape| {
-            check(shape, programs)?;
+            action::check(NAME, shape, programs)?;
             found = Some(shape.clone());
             Ok(())
         })?;
@@ -197,7 +188,7 @@ impl RenderAction for VulkanAction {
     fn begin_draw(&mut self, frame: &FrameDesc) -> Result<(), ActionError> {
         let started = Instant::now();
         let programs = &self.programs;
-        let open = self.lifecycle.begin(frame, |shape| check(shape, programs))?;
+        let open = self.lifecycle.begin(frame, |shape| action::check(NAME, shape, programs))?;
         let shapes: Vec<ResolvedShape> = open.shapes.values().cloned().collect();
         self.drawing.meshes.retain(shapes.iter());
         let kept = self.drawing.volumes.retain(shapes.iter()).map_err(ActionError::from);

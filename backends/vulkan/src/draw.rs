@@ -195,12 +195,8 @@ impl Drawing {
 
     /// The rows of meshes, where they have changed.
     fn set_meshes(&mut self, gpu: &Arc<Gpu>) -> Result<usize, ActionError> {
-        let Some(rows) = self.meshes.rows() else { return Ok(0) };
-        let set = self.mesh_rows.set(gpu, rows);
-        if set.is_err() {
-            self.meshes.forget();
-        }
-        set
+        let rows = &mut self.mesh_rows;
+        self.meshes.lay(|laid| rows.set(gpu, laid))
     }
 
     /// What the application has drawn, where it has changed.

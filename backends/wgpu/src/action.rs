@@ -9,13 +9,14 @@ use volact_core::{
 use volact_shaders::{
     Programs,
     gpu::{
+        action,
         mesh::surface::is_surface,
         scene::{Item, cut_short, overlapping, overrun},
     },
 };
 
 use crate::{
-    check::{self, NAME, check},
+    NAME,
     device::{DeviceError, Gpu},
     draw::Drawing,
     method,
@@ -188,12 +189,12 @@ impl RenderAction for WgpuAction {
     }
 
     fn caps(&self) -> Caps {
-        check::caps(self.gpu.description())
+        action::caps(self.gpu.description())
     }
 
     fn manage(&mut self, shape: &Shape) -> Result<(), ActionError> {
         let programs = &self.programs;
-        self.lifecycle.manage(shape, |shape| check(shape, programs))?;
+        self.lifecycle.manage(shape, |shape| action::check(NAME, shape, programs))?;
         log::debug!("wgpu: manages {:?}", shape.name());
         Ok(())
     }
@@ -205,7 +206,7 @@ impl RenderAction for WgpuAction {
     fn begin_draw(&mut self, frame: &FrameDesc) -> Result<(), ActionError> {
         let mut started = Started { at: Instant::now(), uploaded: 0, rebuilt: Vec::new() };
         let programs = &self.programs;
-        let open = self.lifecycle.begin(frame, |shape| check(shape, programs))?;
+        let open = self.lifecycle.begin(frame, |shape| action::check(NAME, shape, programs))?;
         let shapes: Vec<ResolvedShape> = open.shapes.values().cloned().collect();
         let scopes = self.gpu.scopes();
         let prepared = self.prepare(&shapes, &mut started);

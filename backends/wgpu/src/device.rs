@@ -6,7 +6,7 @@ use thiserror::Error;
 use volact_core::{ActionError, select::SOFTWARE};
 use volact_shaders::gpu::scene::cuts_loops;
 
-use crate::{check::NAME, options::Adapter};
+use crate::{NAME, options::Adapter};
 
 /// Why there is no device, or no more.
 #[derive(Clone, Debug, Error)]

@@ -14,8 +14,8 @@ use volact_shaders::gpu::{
 };
 
 use crate::{
-    bands::{self, Band, Bounds, bands},
-    check::NAME,
+    NAME,
+    bands::{self, Band, bands},
     device::Gpu,
     onto::{Laying, Onto},
     options::Settings,
@@ -139,8 +139,7 @@ impl Drawing {
         }
         let rows = seen.rows(desc, settings.termination, desc.opaque.is_some() || depth.is_some(), numbered);
         uploaded += self.frame.set(gpu, rows.clone())?;
-        let bounds = Bounds { samples: settings.submission, pixels: usize::MAX };
-        let height = bands::height(&seen.viewport, plan::samples(items, lattice.step), &bounds);
+        let height = bands::height(&seen.viewport, plan::samples(items, lattice.step), settings.submission);
         self.make_target(gpu, &seen.viewport, height)?;
         if let Some((corners, polygons)) = lattice.corners(&seen, !surfaces.is_empty()) {
             uploaded += self.slabs.set(gpu, corners, polygons)?;
@@ -184,12 +183,8 @@ impl Drawing {
 
     /// The rows of meshes, where they have changed.
     fn set_meshes(&mut self, gpu: &Gpu) -> Result<usize, ActionError> {
-        let Some(rows) = self.meshes.rows() else { return Ok(0) };
-        let set = self.mesh_rows.set(gpu, rows);
-        if set.is_err() {
-            self.meshes.forget();
-        }
-        set
+        let rows = &mut self.mesh_rows;
+        self.meshes.lay(|laid| rows.set(gpu, laid))
     }
 
     /// What the application has drawn, where it has changed.

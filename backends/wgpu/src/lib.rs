@@ -34,7 +34,6 @@
 
 mod action;
 pub mod bands;
-mod check;
 pub mod device;
 pub mod draw;
 mod method;
@@ -54,6 +53,9 @@ pub use options::declaration;
 use std::sync::Arc;
 
 use volact_core::{Registry, registry::RegisterError};
+
+/// The action's name.
+pub const NAME: &str = "wgpu";
 
 /// Registers the action.
 ///

@@ -1,7 +1,7 @@
 //! What a frame says about how it was made.
 
 use volact_core::{Compositing, Method, ParameterValue, Warning, WarningCode, resolve::ResolvedShape};
-use volact_shaders::gpu::mesh::surface::is_surface;
+use volact_shaders::gpu::action;
 
 use crate::{
     device::Gpu,
@@ -11,11 +11,8 @@ use crate::{
 };
 
 /// How the shapes drawn were made into a picture.
-pub fn method(drawn: &[&ResolvedShape], volumes: &Volumes, made: &Drawn, settings: &Settings, gpu: &Gpu) -> Method {
-    let held: Vec<&Held> = all(drawn, volumes).map(|(_, held)| held).collect();
-    let mut formats: Vec<_> = held.iter().map(|h| h.encoding.name()).collect();
-    formats.sort();
-    formats.dedup();
+pub fn method(drawn: &[&ResolvedShape], held: &Volumes, made: &Drawn, settings: &Settings, gpu: &Gpu) -> Method {
+    let held: Vec<&Held> = all(drawn, held).map(|(_, held)| held).collect();
     let first = |s: &&ResolvedShape| s.compositing() == Compositing::First;
     let mut classification = Vec::new();
     if drawn.iter().any(|s| !first(s)) || drawn.is_empty() {
@@ -24,21 +21,17 @@ pub fn method(drawn: &[&ResolvedShape], volumes: &Volumes, made: &Drawn, setting
     if drawn.iter().any(first) {
         classification.push("crossings found by the shader's values");
     }
-    let mut sampling = Vec::new();
-    if drawn.iter().any(|s| !is_surface(s)) || drawn.is_empty() {
-        sampling.push(if made.planes.is_some() { "planes along the view axis" } else { "ray casting" });
-        sampling.push("midpoint lattice");
-    }
-    if drawn.iter().any(|s| is_surface(s)) {
-        sampling.push("nearest triangle");
-    }
+    let volumes = match made.planes {
+        Some(_) => "planes along the view axis, midpoint lattice",
+        None => "ray casting, midpoint lattice",
+    };
     let hardware = settings.hardware && held.iter().any(|h| h.filterable);
     Method {
-        sampling: sampling.join(", "),
+        sampling: action::sampling(drawn, volumes),
         sample_distance: made.step,
         classification: classification.join(", "),
         table_width: 0,
-        texture_format: formats.join(", "),
+        texture_format: action::formats(held.iter().map(|h| h.encoding.name())),
         filter: if hardware { "hardware" } else { "f32, exact weights" }.into(),
         blend: "f32".into(),
         termination: settings.termination,

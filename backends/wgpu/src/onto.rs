@@ -9,7 +9,7 @@ use volact_shaders::gpu::{
     onto::{DepthNumbers, limits, onto},
 };
 
-use crate::{bands::Band, check::NAME, device::Gpu, draw::group, pipeline::entry};
+use crate::{NAME, bands::Band, device::Gpu, draw::group, pipeline::entry};
 
 /// What an application draws into.
 #[derive(Clone, Copy, Debug)]

@@ -5,7 +5,7 @@ use std::{collections::HashMap, sync::Arc};
 use volact_core::ActionError;
 use volact_shaders::gpu::{ComposeError, Layout, Recipe, VolumeUse, compose, compose_slices, runs::Corner, scene::Key};
 
-use crate::{check::NAME, device::Gpu, slabs};
+use crate::{NAME, device::Gpu, slabs};
 
 /// Pipelines that are kept.
 const MOST: usize = 64;

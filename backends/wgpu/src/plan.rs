@@ -14,7 +14,7 @@ use volact_shaders::gpu::{
 };
 
 use crate::{
-    check::NAME,
+    NAME,
     options::{Means, Settings},
     pipeline::Stage,
 };

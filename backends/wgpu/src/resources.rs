@@ -9,7 +9,7 @@ use volact_shaders::gpu::{
     voxels::{Encoding, Texel, Wanted},
 };
 
-use crate::{check::NAME, device::Gpu, options::Settings};
+use crate::{NAME, device::Gpu, options::Settings};
 
 /// Bytes of voxels that are handed over at a time.
 const SLAB: usize = 64 << 20;

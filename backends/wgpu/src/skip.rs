@@ -15,7 +15,7 @@ use volact_shaders::{
 };
 
 use crate::{
-    check::NAME,
+    NAME,
     device::Gpu,
     resources::{Held, Volumes},
 };

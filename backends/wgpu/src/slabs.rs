@@ -11,8 +11,8 @@ use volact_shaders::gpu::{
 };
 
 use crate::{
+    NAME,
     bands::Band,
-    check::NAME,
     device::Gpu,
     draw::group,
     pipeline::{entry, frame_group},

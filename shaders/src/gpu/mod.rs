@@ -19,6 +19,7 @@
 //!
 //! All numbers are f32 in [local space](crate::signatures), the origin near the shape.
 
+pub mod action;
 mod compose;
 #[cfg(feature = "mutations")]
 mod faults;

@@ -24,7 +24,7 @@ use super::pack::Row;
 use numbers::Numbers;
 use packed::packed;
 
-/// Cells of one mesh at most, so that four faces of each can be numbered eightfold.
+/// Cells of one mesh, or triangles of a surface, at most, so that four faces of each can be numbered eightfold.
 const MOST: usize = 1 << 26;
 
 /// Whether a shape is drawn as a mesh: whatever is no block, and blocks that carry numbers.
@@ -105,13 +105,23 @@ impl Meshes {
         self.held.retain(|id, _| ids.contains(id));
     }
 
-    /// The rows of all meshes that are held, where they are others than the last time; some in any case.
-    pub fn rows(&mut self) -> Option<Vec<Row>> {
+    /// Has the rows of all meshes that are held set where they belong, unless they are what was set last; some
+    /// in any case. Gives what `set` gives, which is bytes.
+    ///
+    /// # Errors
+    /// Those of `set`, after which they are set anew.
+    pub fn lay<E>(&mut self, set: impl FnOnce(Vec<Row>) -> Result<usize, E>) -> Result<usize, E> {
         let laid: Vec<_> = self.held.iter().map(|(id, held)| [*id, held.pack]).collect();
         if self.laid.as_ref() == Some(&laid) {
-            return None;
+            return Ok(0);
         }
+        self.laid = None;
+        let bytes = set(self.rows())?;
         self.laid = Some(laid);
+        Ok(bytes)
+    }
+
+    fn rows(&mut self) -> Vec<Row> {
         let mut rows = Vec::new();
         for held in self.held.values_mut() {
             held.row = rows.len() as u32;
@@ -121,12 +131,7 @@ impl Meshes {
         if rows.is_empty() {
             rows.push([0; 4]);
         }
-        Some(rows)
-    }
-
-    /// Has the rows given again: they did not get to where they belong.
-    pub fn forget(&mut self) {
-        self.laid = None;
+        rows
     }
 
     /// Where a shape's mesh lies, once it was packed and the rows were laid out.
@@ -150,6 +155,7 @@ impl Meshes {
 /// A shape's rows, the box around it, and how many vertices it has.
 fn rows_of(action: &str, shape: &ResolvedShape, cells: bool) -> Result<(Vec<Row>, Aabb, usize), ActionError> {
     if let Some(surface) = shape.state.geometry.as_surface() {
+        limit(action, shape, "triangles", surface.triangles().len())?;
         let bounds = surface.points().bounds();
         return Ok((surface::packed(surface, &unit(&bounds)), bounds, surface.points().len()));
     }
@@ -163,14 +169,7 @@ fn tessellated(action: &str, shape: &ResolvedShape) -> Result<Tessellation, Acti
     let geometry = &shape.state.geometry;
     let made = geometry.tessellate().and_then(|made| made.validate(geometry.name()).map(|()| made));
     let made = made.map_err(|source: GeometryError| ActionError::Geometry { shape: shape.name.clone(), source })?;
-    if made.tetrahedra.len() >= MOST {
-        return Err(ActionError::Limit {
-            action: action.into(),
-            what: format!("number of tetrahedra of shape {:?}", shape.name),
-            found: made.tetrahedra.len().to_string(),
-            wanted: format!("fewer than {MOST}"),
-        });
-    }
+    limit(action, shape, "tetrahedra", made.tetrahedra.len())?;
     if made.texture_coordinates.is_some() && shape.first_volume().is_some() {
         return Err(ActionError::Unsupported {
             action: action.into(),
@@ -180,6 +179,19 @@ fn tessellated(action: &str, shape: &ResolvedShape) -> Result<Tessellation, Acti
         });
     }
     Ok(made)
+}
+
+/// Refuses more of something than can be numbered.
+fn limit(action: &str, shape: &ResolvedShape, of: &str, found: usize) -> Result<(), ActionError> {
+    if found < MOST {
+        return Ok(());
+    }
+    Err(ActionError::Limit {
+        action: action.into(),
+        what: format!("number of {of} of shape {:?}", shape.name),
+        found: found.to_string(),
+        wanted: format!("fewer than {MOST}"),
+    })
 }
 
 /// Refuses attributes that have not a number for each vertex.

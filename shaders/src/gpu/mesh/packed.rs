@@ -2,61 +2,43 @@
 
 use volact_core::{
     Tessellation,
+    bvh::Bvh,
     geometry::{Adjacency, BOUNDARY},
     glam::{DAffine3, DMat3, DVec3},
 };
 
 use super::{
     Row,
-    tree::{Seed, Tree},
+    tree::{self, row},
 };
-
-/// Rows of the head.
-pub const HEAD: u32 = 2;
 
 /// A mesh's rows, in the space of `unit`, with its cells where they carry something.
 pub fn packed(made: &Tessellation, unit: &DAffine3, cells: bool) -> Vec<Row> {
     let adjacency = Adjacency::new(&made.tetrahedra);
     let place = |v: u32| unit.transform_point3(made.vertices.at(v as usize)).as_vec3().to_array();
     let mut vertices = Numbered { numbers: vec![u32::MAX; made.vertices.len()], places: Vec::new() };
-    let (mut faces, mut seeds) = (Vec::new(), Vec::new());
-    for corners in adjacency.boundary(&made.tetrahedra) {
-        let places = corners.map(place);
-        seeds.push(Seed::around(faces.len() as u32, &places));
-        faces.push([0, 1, 2].map(|i| vertices.number(corners[i], places[i])));
-    }
-    let tree = Tree::new(&mut seeds);
-    let mut rows = vec![[0; 4]; HEAD as usize];
-    rows.extend(tree.rows());
-    let first_face = rows.len() as u32;
-    rows.extend(seeds.iter().map(|s| faces[s.item as usize]).map(|[a, b, c]| [a, b, c, 0]));
-    rows[0] = [tree.len() as u32, HEAD, first_face, rows.len() as u32];
-    rows.extend(vertices.places.iter().map(|p| row(*p, 0)));
+    let boundary = adjacency.boundary(&made.tetrahedra);
+    let faces: Vec<_> = boundary.map(|corners| corners.map(|v| vertices.number(v, place))).collect();
+    let mut rows = tree::triangles(&faces, &vertices.places);
     if cells {
         add_cells(made, &adjacency, unit, &mut rows);
     }
     rows
 }
 
-/// A place and a word.
-pub fn row([x, y, z]: [f32; 3], w: u32) -> Row {
-    [x.to_bits(), y.to_bits(), z.to_bits(), w]
-}
-
 /// Adds cells and their tree.
 fn add_cells(made: &Tessellation, adjacency: &Adjacency, unit: &DAffine3, rows: &mut Vec<Row>) {
     let corners = |cell: usize| made.corners(cell).map(|v| unit.transform_point3(v));
-    let seed = |cell: usize| Seed::around(cell as u32, &corners(cell).map(|v| v.as_vec3().to_array()));
-    let mut seeds: Vec<_> = (0..made.tetrahedra.len()).map(seed).collect();
-    let tree = Tree::new(&mut seeds);
+    let around = |cell: usize| tree::around(&corners(cell).map(|v| v.as_vec3().to_array()));
+    let tree = Bvh::new(&(0..made.tetrahedra.len()).map(around).collect::<Vec<_>>());
     let first = rows.len() as u32;
-    rows.extend(tree.rows());
-    rows[1] = [tree.len() as u32, first, rows.len() as u32, 0];
+    let nodes = tree::rows(&tree);
+    rows[1] = [nodes.len() as u32 / 2, first, first + nodes.len() as u32, 0];
+    rows.extend(nodes);
     // Cells lie in the order of the tree's leaves.
-    let mut numbers = vec![BOUNDARY; seeds.len()];
-    seeds.iter().zip(0..).for_each(|(s, number)| numbers[s.item as usize] = number);
-    for seed in &seeds {
-        let cell = seed.item as usize;
+    let mut numbers = vec![BOUNDARY; made.tetrahedra.len()];
+    tree.items().iter().zip(0..).for_each(|(cell, number)| numbers[*cell as usize] = number);
+    for cell in tree.items().iter().map(|cell| *cell as usize) {
         rows.extend(weights(corners(cell)));
         rows.push(made.tetrahedra[cell]);
         rows.push(adjacency.neighbours[cell].map(|n| if n == BOUNDARY { BOUNDARY } else { numbers[n as usize] }));
@@ -84,11 +66,11 @@ struct Numbered {
 }
 
 impl Numbered {
-    fn number(&mut self, vertex: u32, place: [f32; 3]) -> u32 {
+    fn number(&mut self, vertex: u32, place: impl Fn(u32) -> [f32; 3]) -> u32 {
         let number = &mut self.numbers[vertex as usize];
         if *number == u32::MAX {
             *number = self.places.len() as u32;
-            self.places.push(place);
+            self.places.push(place(vertex));
         }
         *number
     }

@@ -9,7 +9,7 @@ use volact_core::{
 
 use super::{
     Meshes, Row,
-    tree::{Seed, Tree},
+    tree::{self, row},
 };
 use crate::gpu::{Anchor, SHAPE_ROWS, pack};
 
@@ -46,16 +46,7 @@ pub fn check(action: &str, shape: &ResolvedShape) -> Result<(), ActionError> {
 pub(super) fn packed(surface: &Surface, unit: &DAffine3) -> Vec<Row> {
     let single = |v: DVec3| v.as_vec3().to_array();
     let places: Vec<[f32; 3]> = surface.points().iter().map(|v| single(unit.transform_point3(v))).collect();
-    let faces = surface.triangles();
-    let seed = |(i, t): (usize, &[u32; 3])| Seed::around(i as u32, &t.map(|v| places[v as usize]));
-    let mut seeds: Vec<_> = faces.iter().enumerate().map(seed).collect();
-    let tree = Tree::new(&mut seeds);
-    let mut rows = vec![[0; 4]; super::packed::HEAD as usize];
-    rows.extend(tree.rows());
-    let first_face = rows.len() as u32;
-    rows.extend(seeds.iter().map(|s| faces[s.item as usize]).map(|[a, b, c]| [a, b, c, 0]));
-    rows[0] = [tree.len() as u32, super::packed::HEAD, first_face, rows.len() as u32];
-    rows.extend(places.iter().map(|p| super::packed::row(*p, 0)));
+    let mut rows = tree::triangles(surface.triangles(), &places);
     rows[1][3] = rows.len() as u32;
     // Normals are covectors: they go by the inverse transpose.
     let to_mesh = unit.matrix3.inverse().transpose();
@@ -63,7 +54,7 @@ pub(super) fn packed(surface: &Surface, unit: &DAffine3) -> Vec<Row> {
     // They keep their lengths against each other, by which they count between vertices.
     let longest = normals.iter().fold(0.0, |m: f64, n| m.max(n.length()));
     let scale = if longest > 0.0 && longest.is_finite() { 1.0 / longest } else { 0.0 };
-    rows.extend(normals.into_iter().map(|n| super::packed::row(single(n * scale), 0)));
+    rows.extend(normals.into_iter().map(|n| row(single(n * scale), 0)));
     rows
 }
 

@@ -1,103 +1,52 @@
-//! A tree of boxes that is gone through without a stack: nodes lie depth first, and each knows which to go
-//! on with where it is missed.
+//! A tree of boxes as rows, which a shader goes through without a stack: nodes lie depth first, and each knows
+//! which to go on with where it is missed.
+
+use volact_core::{Aabb, bvh::Bvh, glam::DVec3};
 
 use super::Row;
 
-/// Items of a leaf at most.
-const LEAF: usize = 4;
+/// Rows of a mesh's head.
+pub const HEAD: u32 = 2;
 
-/// An item's box.
-#[derive(Clone, Copy, Debug)]
-pub struct Seed {
-    /// Its number.
-    pub item: u32,
-    low: [f32; 3],
-    high: [f32; 3],
+/// The box around places.
+pub fn around(places: &[[f32; 3]]) -> Aabb {
+    places.iter().fold(Aabb::EMPTY, |all, p| {
+        let p = DVec3::from(p.map(f64::from));
+        all.union(&Aabb::new(p, p))
+    })
 }
 
-impl Seed {
-    /// The box around places, of which there is at least one.
-    pub fn around(item: u32, places: &[[f32; 3]]) -> Self {
-        let start = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
-        let wider =
-            |(low, high): ([f32; 3], [f32; 3]), p: &[f32; 3]| (each(low, *p, f32::min), each(high, *p, f32::max));
-        let (low, high) = places.iter().fold(start, wider);
-        Self { item, low, high }
+/// Two rows a node: lowest corner and the node to go on with, highest corner and leaf, which is 8 times the
+/// place of its first item and the number of its items.
+pub fn rows(tree: &Bvh) -> Vec<Row> {
+    let mut rows = Vec::new();
+    for node in tree.nodes() {
+        let corner = |p: DVec3, outward: fn(f32) -> f32| p.to_array().map(|v| outward(v as f32));
+        rows.push(row(corner(node.bounds.min, f32::next_down), node.skip as u32));
+        let leaf = 8 * node.items.start + node.items.len();
+        rows.push(row(corner(node.bounds.max, f32::next_up), leaf as u32));
     }
-
-    /// Twice the middle.
-    fn middle(&self, axis: usize) -> f32 {
-        self.low[axis] + self.high[axis]
-    }
+    rows
 }
 
-fn each(a: [f32; 3], b: [f32; 3], choose: fn(f32, f32) -> f32) -> [f32; 3] {
-    [0, 1, 2].map(|i| choose(a[i], b[i]))
+/// A head with room for more, and behind it triangles under their tree, and places.
+pub fn triangles(faces: &[[u32; 3]], places: &[[f32; 3]]) -> Vec<Row> {
+    let around = |face: &[u32; 3]| around(&face.map(|v| places[v as usize]));
+    let tree = Bvh::new(&faces.iter().map(around).collect::<Vec<_>>());
+    let mut all = vec![[0; 4]; HEAD as usize];
+    let nodes = rows(&tree);
+    let first_face = HEAD + nodes.len() as u32;
+    let first_place = first_face + tree.items().len() as u32;
+    all[0] = [nodes.len() as u32 / 2, HEAD, first_face, first_place];
+    all.extend(nodes);
+    all.extend(tree.items().iter().map(|&f| faces[f as usize]).map(|[a, b, c]| [a, b, c, 0]));
+    all.extend(places.iter().map(|p| row(*p, 0)));
+    all
 }
 
-/// A box with those inside of it behind it.
-#[derive(Clone, Copy, Debug)]
-struct Node {
-    low: [f32; 3],
-    high: [f32; 3],
-    /// The node to go on with where this one is missed.
-    skip: u32,
-    /// 8 times the first item and the number of items of a leaf, else 0.
-    leaf: u32,
-}
-
-/// Items are halved at the median of their middles along the longest axis.
-#[derive(Debug, Default)]
-pub struct Tree(Vec<Node>);
-
-impl Tree {
-    /// The tree over boxes, which it puts in the order of its leaves.
-    pub fn new(seeds: &mut [Seed]) -> Self {
-        let mut made = Self::default();
-        made.build(seeds, 0);
-        made
-    }
-
-    /// The number of nodes.
-    pub fn len(&self) -> usize {
-        self.0.len()
-    }
-
-    /// Two rows a node: lowest corner and the node to go on with, highest corner and leaf.
-    pub fn rows(&self) -> Vec<Row> {
-        let row = |[x, y, z]: [f32; 3], w| [x.to_bits(), y.to_bits(), z.to_bits(), w];
-        self.0.iter().flat_map(|n| [row(n.low, n.skip), row(n.high, n.leaf)]).collect()
-    }
-
-    /// Adds the nodes over seeds, of which the first has that place in the order.
-    fn build(&mut self, seeds: &mut [Seed], first: usize) {
-        let Some(one) = seeds.first() else { return };
-        let whole = (one.low, one.high);
-        let (low, high) = seeds.iter().fold(whole, |(l, h), s| (each(l, s.low, f32::min), each(h, s.high, f32::max)));
-        let at = self.0.len();
-        self.0.push(Node { low, high, skip: 0, leaf: 0 });
-        if seeds.len() <= LEAF {
-            self.0[at].leaf = (8 * first + seeds.len()) as u32;
-        } else {
-            let axis = longest(seeds);
-            let half = seeds.len() / 2;
-            seeds.select_nth_unstable_by(half, |a, b| a.middle(axis).total_cmp(&b.middle(axis)));
-            let (left, right) = seeds.split_at_mut(half);
-            self.build(left, first);
-            self.build(right, first + half);
-        }
-        self.0[at].skip = self.0.len() as u32;
-    }
-}
-
-/// The axis along which the middles are farthest apart.
-fn longest(seeds: &[Seed]) -> usize {
-    let extent = |a: usize| {
-        let start = (f32::INFINITY, f32::NEG_INFINITY);
-        let (low, high) = seeds.iter().fold(start, |(l, h), s| (l.min(s.middle(a)), h.max(s.middle(a))));
-        high - low
-    };
-    (0..3).max_by(|a, b| extent(*a).total_cmp(&extent(*b))).unwrap_or(0)
+/// A place and a word.
+pub fn row([x, y, z]: [f32; 3], w: u32) -> Row {
+    [x.to_bits(), y.to_bits(), z.to_bits(), w]
 }
 
 #[cfg(test)]
@@ -105,46 +54,37 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// What a shader visits: items of leaves all of whose boxes hold a place.
-    fn visited(tree: &Tree, seeds: &[Seed], place: [f32; 3]) -> Vec<u32> {
-        let (mut found, mut at) = (Vec::new(), 0);
-        while at < tree.len() {
-            let node = tree.0[at];
-            if (0..3).any(|a| place[a] < node.low[a] || place[a] > node.high[a]) {
-                at = node.skip as usize;
-                continue;
-            }
-            let first = (node.leaf / 8) as usize;
-            found.extend(seeds[first..first + (node.leaf % 8) as usize].iter().map(|s| s.item));
-            at += 1;
-        }
-        found
-    }
-
     proptest! {
+        /// As meshes.wgsl goes through them.
         #[test]
-        fn every_box_that_holds_a_place_is_visited_once(
-            boxes in prop::collection::vec([prop::array::uniform3(-9.0..9.0f32), prop::array::uniform3(-9.0..9.0f32)], 0..90),
-            place in prop::array::uniform3(-9.0..9.0f32),
+        fn every_triangle_around_a_place_is_visited_once(
+            faces in prop::collection::vec(prop::array::uniform3(prop::array::uniform3(-1.0..1.0f32)), 0..60),
+            place in prop::array::uniform3(-1.0..1.0f32),
         ) {
-            let mut seeds: Vec<_> = (0..).zip(&boxes).map(|(i, places)| Seed::around(i, places)).collect();
-            let tree = Tree::new(&mut seeds);
-            let mut found = visited(&tree, &seeds, place);
+            let places: Vec<_> = faces.iter().flatten().copied().collect();
+            let numbers: Vec<_> = (0..faces.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+            let rows = triangles(&numbers, &places);
+            let [nodes, first, first_face, first_place] = rows[0];
+            prop_assert_eq!(rows.len(), first_place as usize + places.len());
+            let (mut at, mut found) = (0, Vec::new());
+            while at < nodes {
+                let [low, high] = [0, 1].map(|i| rows[(first + 2 * at + i) as usize]);
+                let inside = |a: usize| f32::from_bits(low[a]) <= place[a] && place[a] <= f32::from_bits(high[a]);
+                if !(0..3).all(inside) {
+                    at = low[3];
+                    continue;
+                }
+                found.extend((high[3] / 8..high[3] / 8 + high[3] % 8).map(|i| rows[(first_face + i) as usize]));
+                at += 1;
+            }
             found.sort_unstable();
             prop_assert!(found.windows(2).all(|w| w[0] < w[1]), "{found:?}");
-            for seed in &seeds {
-                let inside = (0..3).all(|a| seed.low[a] <= place[a] && place[a] <= seed.high[a]);
-                prop_assert!(!inside || found.contains(&seed.item), "{seed:?}");
+            for ([a, b, c], corners) in numbers.into_iter().zip(&faces) {
+                let held = around(corners);
+                let place = DVec3::from(place.map(f64::from));
+                let inside = held.min.cmple(place).all() && held.max.cmpge(place).all();
+                prop_assert!(!inside || found.contains(&[a, b, c, 0]), "{corners:?}");
             }
-            // No more nodes than items, but for one.
-            prop_assert!(tree.len() <= seeds.len().max(1));
         }
-    }
-
-    #[test]
-    fn boxes_in_one_place_are_all_found() {
-        let mut seeds: Vec<_> = (0..1000).map(|i| Seed::around(i, &[[0.5; 3]])).collect();
-        let tree = Tree::new(&mut seeds);
-        assert_eq!(visited(&tree, &seeds, [0.5; 3]).len(), 1000);
     }
 }
