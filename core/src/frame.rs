@@ -5,7 +5,7 @@ use std::time::Duration;
 use glam::DVec3;
 use thiserror::Error;
 
-use crate::{Aabb, Camera, Clip, Opaque, Pixels, Shape, View, Warning, camera::CameraError};
+use crate::{Aabb, Camera, Clip, Opaque, Pixels, Shape, View, Warning, camera::CameraError, planner::Plan};
 
 /// A rectangle of pixels; row 0 is at the top.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -236,6 +236,8 @@ pub struct Frame {
     pub method: Method,
     /// What it cost.
     pub statistics: Statistics,
+    /// How it was planned, where an error or a time was asked for.
+    pub plan: Option<Plan>,
 }
 
 impl Frame {
@@ -251,6 +253,7 @@ impl Frame {
             warnings: Vec::new(),
             method: Method::default(),
             statistics: Statistics::default(),
+            plan: None,
         }
     }
 

@@ -26,6 +26,7 @@ pub mod null;
 pub mod opaque;
 pub mod parameter;
 pub mod pixels;
+pub mod planner;
 #[expect(unsafe_code, reason = "what crosses to plugins is C")]
 pub mod plugin;
 pub mod registry;

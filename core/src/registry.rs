@@ -15,6 +15,7 @@ use crate::{
     loader::{self, Content, NoProgress},
     null::{self, NullAction},
     parameter::{Kind, ParameterMap},
+    planner::{self, Actor, Goals, PlannedAction, Rates},
     shader::{self, ShaderCatalog},
 };
 
@@ -57,6 +58,7 @@ pub struct Registry {
     shaders: ShaderCatalog,
     origins: BTreeMap<(Kind, String), String>,
     progress: Watch,
+    rates: Rates,
 }
 
 impl Registry {
@@ -75,7 +77,8 @@ impl Registry {
 
     fn register_core(&mut self) -> Result<(), RegisterError> {
         self.add_action(null::declaration(), Arc::new(|context, _| Ok(Box::new(NullAction::new(context)))))?;
-        // `checked` is made by `action`, which can look up what it wraps.
+        // `checked` and `planned` are made by `action`, which can look up what they wrap.
+        self.add_action(planner::declaration(), Arc::new(|context, _| Ok(Box::new(NullAction::new(context)))))?;
         self.add_action(checked::declaration(), Arc::new(|context, _| Ok(Box::new(NullAction::new(context)))))?;
         self.add_geometry(block_declaration(), Arc::new(make_block))?;
         self.add_geometry(sphere_declaration(), Arc::new(make_sphere))?;
@@ -211,6 +214,9 @@ impl Registry {
     pub fn action(&self, name: &str, options: &Options) -> Result<Box<dyn RenderAction>, ActionError> {
         let (declaration, factory) = self.actions.get(name).ok_or_else(|| self.unknown_action(name))?;
         let context = Context { shaders: self.shaders.clone(), progress: self.progress.clone() };
+        if name == "planned" {
+            return self.planned(&context, options);
+        }
         if name == "checked" {
             let mut inner = options.clone();
             let decl = declaration.parameter("of").cloned().unwrap_or_else(|| {
@@ -229,6 +235,56 @@ impl Registry {
             .map_err(|problems| ActionError::Options { action: name.into(), problems })?;
         log::debug!("action {name} {} with {options:?}", declaration.version);
         factory(&context, &options)
+    }
+
+    /// Makes the action that plans for those which its option `of` names, with the options that are not its own.
+    /// Errors are taken from `cpu` where that is known, which interpolates and accumulates in f32 throughout.
+    fn planned(&self, context: &Context, options: &Options) -> Result<Box<dyn RenderAction>, ActionError> {
+        let declaration = planner::declaration();
+        let own = |name: &str| declaration.parameter(name).is_some();
+        let (given, passed): (Options, Options) = options.clone().into_iter().partition(|(name, _)| own(name));
+        let wrong = |problems| ActionError::Options { action: "planned".into(), problems };
+        let resolved = declaration.resolve(&given, |_| false).map_err(wrong)?;
+        let Some(ParameterValue::Choice(of)) = resolved.get("of") else { return Err(self.unknown_action("")) };
+        let mut actors = Vec::new();
+        for name in of.split_whitespace() {
+            if name == "planned" {
+                return Err(self.unknown_action("planned of planned"));
+            }
+            let (known, _) = self.actions.get(name).ok_or_else(|| self.unknown_action(name))?;
+            // An option is for those who have it; one that nobody has is told by the first.
+            let anybody = |option: &str| {
+                let has = |n: &str| self.actions.get(n).is_some_and(|(d, _)| d.parameter(option).is_some());
+                of.split_whitespace().any(has)
+            };
+            let theirs = |(option, _): &(String, ParameterValue)| known.parameter(option).is_some() || !anybody(option);
+            let theirs: Options = passed.clone().into_iter().filter(theirs).collect();
+            actors.push(Actor::new(name, self.action(name, &theirs)?, theirs));
+        }
+        if actors.is_empty() {
+            return Err(self.unknown_action(of));
+        }
+        Ok(Box::new(PlannedAction::new(context, (actors, self.truth()), given, self.rates.clone())?))
+    }
+
+    /// Plans for actions that are made already, with their options, to goals.
+    ///
+    /// # Errors
+    /// None that goals of this type can have.
+    pub fn plan_for(&self, actors: Vec<Actor>, goals: &Goals) -> Result<PlannedAction, ActionError> {
+        let context = Context { shaders: self.shaders.clone(), progress: self.progress.clone() };
+        PlannedAction::new(&context, (actors, self.truth()), goals.options(), self.rates.clone())
+    }
+
+    /// Who draws what errors are taken from.
+    fn truth(&self) -> Option<Actor> {
+        let action = self.action("cpu", &Options::new()).ok()?;
+        Some(Actor::new("cpu", action, Options::new()))
+    }
+
+    /// Sets how fast actions are on this machine, for plans made from now on.
+    pub fn set_rates(&mut self, rates: Rates) {
+        self.rates = rates;
     }
 
     /// Makes a geometry.

@@ -6,7 +6,10 @@ use std::fmt;
 use thiserror::Error;
 
 use crate::{
-    ActionError, Caps, Compositing, Options, Registry, RenderAction, Shape, config::Config, resolve::ResolvedShape,
+    ActionError, Caps, Compositing, Options, Registry, RenderAction, Shape,
+    config::Config,
+    planner::{Actor, Goals},
+    resolve::ResolvedShape,
 };
 
 /// An action that can draw a scene and manages its shapes.
@@ -97,6 +100,45 @@ pub fn select(
         refused.retain(|(other, _)| *other != name);
         Choice { name, action, refused }
     })
+}
+
+/// As [`select`], for goals: the action named, or all preferred ones that can draw and run on no
+/// [software](SOFTWARE) device, are planned for, and the cheapest settings of all keep the goals.
+/// Without goals it is [`select`].
+///
+/// # Errors
+/// As [`select`].
+pub fn select_for(
+    registry: &Registry,
+    config: &Config,
+    named: Option<&str>,
+    options: &Options,
+    (goals, shapes): (&Goals, &[Shape]),
+) -> Result<Choice, SelectError> {
+    if *goals == Goals::default() {
+        return select(registry, config, named, options, shapes);
+    }
+    let first = select(registry, config, named, options, shapes)?;
+    let mut refused = first.refused;
+    let mut names = vec![first.name.clone()];
+    let given = config.options_of(&first.name, options);
+    let mut actors = vec![Actor::new(&first.name, first.action, given)];
+    let tried = |name: &String| *name == names[0] || refused.iter().any(|(other, _)| other == name);
+    let further: Vec<_> = config.prefer.iter().filter(|name| named.is_none() && !tried(name)).collect();
+    for name in further {
+        let given = config.options_of(name, options);
+        match attempt(registry, name, &given, shapes) {
+            Ok(action) if !action.caps().device.starts_with(SOFTWARE) => {
+                names.push(name.clone());
+                actors.push(Actor::new(name, action, given));
+            }
+            Ok(action) => refused.push((name.clone(), format!("{NO_DEVICE} that is a GPU ({})", action.caps().device))),
+            Err(why) => refused.push((name.clone(), why)),
+        }
+    }
+    let mut action: Box<dyn RenderAction> = Box::new(registry.plan_for(actors, goals)?);
+    shapes.iter().try_for_each(|shape| action.manage(shape))?;
+    Ok(Choice { name: format!("planned of {}", names.join(" ")), action, refused })
 }
 
 fn attempt(

@@ -249,7 +249,7 @@ unsafe extern "C" fn rebuilt(user: *mut c_void, shape: Text, what: Text, bytes: 
 /// # Safety
 /// The sink is valid.
 pub(super) unsafe fn show(frame: Frame, sink: &FrameSink) -> Result<(), Fault> {
-    let Frame { width, height, color, depth, background: _, warnings, method, statistics } = frame;
+    let Frame { width, height, color, depth, background: _, warnings, method, statistics, plan: _ } = frame;
     let (width, height) = (width as u64, height as u64);
     let missing = || Fault::new(Code::BadVersion, "the frame's sink lacks a function");
     let mut arena = Arena::default();

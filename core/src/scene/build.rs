@@ -17,7 +17,7 @@ use super::{
 };
 use crate::{
     Appearance, Data, FrameDesc, Geometry, Opaque, OpaqueDepth, Options, ParameterDecl, ParameterValue, Progress,
-    Registry, Shape, frame::MAX_PIXELS, parameter::ParameterMap,
+    Registry, Shape, frame::MAX_PIXELS, parameter::ParameterMap, planner::Goals,
 };
 
 /// A scene that can be drawn.
@@ -29,6 +29,8 @@ pub struct Scene {
     pub frame: FrameDesc,
     /// With which action, if the file says so.
     pub action: Option<(String, Options)>,
+    /// The error or the time that is asked for, if the file says so.
+    pub goals: Goals,
 }
 
 /// Why a scene cannot be had.
@@ -101,7 +103,7 @@ impl SceneFile {
             return Err(Problems::new(build.problems));
         }
         kept.retain_used();
-        Ok(Scene { shapes, frame, action })
+        Ok(Scene { shapes, frame, action, goals: self.goals })
     }
 }
 

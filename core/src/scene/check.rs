@@ -138,6 +138,25 @@ impl<'a> Check<'a> {
             };
             declaration = self.known(Kind::Action, &of, "action.options.of");
         }
+        if let Some(planned) = declaration.filter(|_| action.name == "planned") {
+            // What it does not take itself is for the actions that it plans for.
+            let of = match options.get("of") {
+                Some(ParameterSpec::Value(ParameterValue::Choice(of))) => of.clone(),
+                _ => "cpu".into(),
+            };
+            let mut own = options.clone();
+            own.retain(|name, _| planned.parameter(name).is_some());
+            self.given(declaration, "action.options", &own, |_| false);
+            options.retain(|name, _| !own.contains_key(name));
+            let all: Vec<_> =
+                of.split_whitespace().map(|name| self.known(Kind::Action, name, "action.options.of")).collect();
+            for (name, value) in &options {
+                let declares = |d: &&Declaration| d.parameter(name).is_some();
+                let theirs = all.iter().flatten().copied().find(declares).or(all.first().copied().flatten());
+                self.given(theirs, "action.options", &BTreeMap::from([(name.clone(), value.clone())]), |_| false);
+            }
+            return;
+        }
         self.given(declaration, "action.options", &options, |_| false);
     }
 

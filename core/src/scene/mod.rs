@@ -52,7 +52,7 @@ mod view;
 
 use std::collections::BTreeMap;
 
-use crate::{Clip, Registry};
+use crate::{Clip, Registry, planner::Goals};
 
 pub use build::{Scene, SceneError};
 pub use cuts::{parse_plane, parse_region};
@@ -94,6 +94,8 @@ pub struct SceneFile {
     pub image: ImageSpec,
     /// With which action; whoever draws chooses where `None`.
     pub action: Option<ActionSpec>,
+    /// The error or the time that is asked for.
+    pub goals: Goals,
     /// Where everything stood in the text.
     places: Places,
 }

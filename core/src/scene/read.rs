@@ -1,6 +1,6 @@
 //! Reads a scene from its document: data, shapes, action.
 
-use std::collections::BTreeSet;
+use std::{collections::BTreeSet, time::Duration};
 
 use glam::{DAffine3, DVec3};
 
@@ -13,7 +13,7 @@ use super::{
     reader::{At, Reader},
     view::{camera, image},
 };
-use crate::Registry;
+use crate::{Registry, planner::Bound};
 
 /// Reads and checks a text.
 pub(super) fn parse(text: &str, registry: Option<&Registry>) -> Result<SceneFile, Problems> {
@@ -30,7 +30,7 @@ pub(super) fn parse(text: &str, registry: Option<&Registry>) -> Result<SceneFile
 }
 
 fn scene(reader: &mut Reader, at: &At) -> Option<SceneFile> {
-    let known = ["version", "data", "shapes", "clip", "opaque", "camera", "image", "action"];
+    let known = ["version", "data", "shapes", "clip", "opaque", "camera", "image", "action", "accuracy", "time"];
     let fields = reader.fields(at, &["Scene"], &known)?;
     reader.version(&fields, SCENE_VERSION);
     let mut scene = SceneFile::default();
@@ -50,7 +50,30 @@ fn scene(reader: &mut Reader, at: &At) -> Option<SceneFile> {
     scene.camera = fields.optional("camera").and_then(|at| camera(reader, &at));
     scene.image = fields.optional("image").and_then(|at| image(reader, &at)).unwrap_or_default();
     scene.action = fields.optional("action").and_then(|at| action(reader, &at));
+    scene.goals.bound = fields.optional("accuracy").and_then(|at| accuracy(reader, &at));
+    scene.goals.time = fields.optional("time").and_then(|at| time(reader, &at));
     Some(scene)
+}
+
+/// `MaxError(0.002)` or `Rmse(0.0005)`.
+fn accuracy(reader: &mut Reader, at: &At) -> Option<Bound> {
+    for (name, bound) in [("MaxError", Bound::MaxError as fn(f64) -> Bound), ("Rmse", Bound::Rmse)] {
+        if let Some([value]) = reader.tuple(at, name).as_deref() {
+            return reader.float_where(value, |v| v > 0.0, "a positive, finite number").map(bound);
+        }
+    }
+    reader.refuse(at, "MaxError(error) or Rmse(error)")
+}
+
+/// `Milliseconds(40)`.
+fn time(reader: &mut Reader, at: &At) -> Option<Duration> {
+    match reader.tuple(at, "Milliseconds").as_deref() {
+        Some([value]) => {
+            let milliseconds = reader.float_where(value, |v| v > 0.0 && v <= 1e9, "above 0 and at most 1e9");
+            milliseconds.map(|ms| Duration::from_secs_f64(ms * 1e-3))
+        }
+        _ => reader.refuse(at, "Milliseconds(time)"),
+    }
 }
 
 fn unique_names(reader: &mut Reader, places: &[At], scene: &SceneFile) {

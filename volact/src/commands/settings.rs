@@ -29,6 +29,12 @@ fn wanted(found: &str, wanted: &str) -> String {
     format!("found {found:?}, wanted {wanted}")
 }
 
+/// A positive, finite number.
+pub fn positive(text: &str) -> Result<f64, String> {
+    let number = text.parse().ok().filter(|v: &f64| *v > 0.0 && v.is_finite());
+    number.ok_or_else(|| wanted(text, "a positive, finite number"))
+}
+
 /// A view by its name.
 pub fn view(name: &str) -> Result<View, String> {
     let known = View::ALL.map(|(name, _)| name);

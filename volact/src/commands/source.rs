@@ -1,6 +1,9 @@
 //! What to draw: a scene file, or a bare volume or mesh with a look of its own (`bare`).
 
-use std::path::{Path, PathBuf};
+use std::{
+    path::{Path, PathBuf},
+    time::Duration,
+};
 
 use anyhow::{Context as _, bail};
 use volact::{
@@ -8,6 +11,7 @@ use volact::{
     config::Config,
     core::{
         glam::DVec3,
+        planner::{Bound, Goals},
         scene::{CameraSpec, Folders, KeptData, Scene, SceneFile, SceneFiles},
         select::{self, Choice},
     },
@@ -39,6 +43,15 @@ pub struct Args {
     /// Distance between samples in world units (the action's option `sample_distance`)
     #[arg(long, value_name = "DISTANCE")]
     pub step: Option<f64>,
+    /// Ask for an error: the largest difference of any channel, e.g. 0.002; the cheapest settings that keep it are taken
+    #[arg(long, value_name = "ERROR", value_parser = settings::positive, conflicts_with_all = ["rmse", "step"])]
+    pub max_error: Option<f64>,
+    /// Ask for an error: the root of the mean square over all channels
+    #[arg(long, value_name = "ERROR", value_parser = settings::positive, conflicts_with = "step")]
+    pub rmse: Option<f64>,
+    /// Ask for a time: the least error within it
+    #[arg(long, value_name = "MS", value_parser = settings::positive, conflicts_with = "step")]
+    pub milliseconds: Option<f64>,
     /// Threads (the action's option `threads`)
     #[arg(long, value_name = "N")]
     pub threads: Option<u32>,
@@ -120,8 +133,9 @@ impl Source {
     pub fn open(args: &Args, action: Option<&str>, registry: &Registry) -> anyhow::Result<Self> {
         let opened = args.open(registry)?;
         let (name, options) = opened.action(action);
+        let goals = args.goals(&opened.scene);
         let Opened { scene, notes, config, .. } = opened;
-        let choice = select::select(registry, &config, name.as_deref(), &options, &scene.shapes)?;
+        let choice = select::select_for(registry, &config, name.as_deref(), &options, (&goals, &scene.shapes))?;
         Ok(Self { shapes: scene.shapes, frame: scene.frame, choice, notes })
     }
 
@@ -153,6 +167,17 @@ impl Args {
             scene.frame.clip = scene.frame.clip.with(cut.region(&bounds)?);
         }
         Ok(Opened { scene, notes, config, options })
+    }
+
+    /// What is asked for: on the command line, else in the scene. A distance of samples there asks for nothing.
+    pub fn goals(&self, scene: &Scene) -> Goals {
+        let bound = self.max_error.map(Bound::MaxError).or(self.rmse.map(Bound::Rmse));
+        let time = self.milliseconds.map(|ms| Duration::from_secs_f64((ms * 1e-3).min(1e6)));
+        match (bound, time, self.step) {
+            (None, None, Some(_)) => Goals::default(),
+            (None, None, None) => scene.goals,
+            _ => Goals { bound, time },
+        }
     }
 
     /// Whether the input is a scene: `.ron`, but not the `.raw.ron` that describes raw voxels.
