@@ -27,7 +27,7 @@ pub mod source;
 mod tokens;
 mod unfit;
 
-pub use builtin::{Native, builtin, does, recognise};
+pub use builtin::{Native, builtin, does, is_builtin, recognise};
 pub use error::{ShaderError, SourceError, SourceErrors};
 pub use eval::{Environment, Kernel, Machine};
 pub use missing::without_entry;
