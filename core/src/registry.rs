@@ -2,21 +2,19 @@
 
 use std::{collections::BTreeMap, fmt, path::Path, sync::Arc};
 
-use glam::DVec3;
 use thiserror::Error;
 
 use crate::{
-    ActionError, Block, Context, Cylinder, Data, Declaration, Geometry, LoadError, LoadOptions, Loader, MeshData,
-    Options, ParameterDecl, ParameterType, ParameterValue, Progress, RenderAction, ShaderEntry, ShaderText, Sphere,
-    Volume,
+    ActionError, Context, Data, Declaration, Geometry, LoadError, LoadOptions, Loader, MeshData, Options,
+    ParameterDecl, ParameterType, ParameterValue, Progress, RenderAction, ShaderEntry, ShaderText, Volume,
     action::Watch,
     checked::{self, CheckedAction},
-    geometry::GeometryError,
+    geometry::{self, GeometryError},
     loader::{self, Content, NoProgress},
     null::{self, NullAction},
     parameter::{Kind, ParameterMap},
     planner::{self, Actor, Goals, PlannedAction, Rates},
-    shader::{self, ShaderCatalog},
+    shader::{self, RefusedShader, ShaderCatalog},
 };
 
 /// Makes an action from its options, which are checked and have their defaults filled in.
@@ -49,6 +47,9 @@ pub enum RegisterError {
     },
 }
 
+/// Says what is wrong with a shader that comes from elsewhere, its source among it.
+pub type ShaderCheck = Arc<dyn Fn(&ShaderEntry) -> Result<(), String> + Send + Sync>;
+
 /// All that is known by name.
 #[derive(Clone, Default)]
 pub struct Registry {
@@ -59,6 +60,7 @@ pub struct Registry {
     origins: BTreeMap<(Kind, String), String>,
     progress: Watch,
     rates: Rates,
+    shader_check: Option<ShaderCheck>,
 }
 
 impl Registry {
@@ -80,9 +82,9 @@ impl Registry {
         // `checked` and `planned` are made by `action`, which can look up what they wrap.
         self.add_action(planner::declaration(), Arc::new(|context, _| Ok(Box::new(NullAction::new(context)))))?;
         self.add_action(checked::declaration(), Arc::new(|context, _| Ok(Box::new(NullAction::new(context)))))?;
-        self.add_geometry(block_declaration(), Arc::new(make_block))?;
-        self.add_geometry(sphere_declaration(), Arc::new(make_sphere))?;
-        self.add_geometry(cylinder_declaration(), Arc::new(make_cylinder))?;
+        for (declaration, factory) in geometry::builtin() {
+            self.add_geometry(declaration, factory)?;
+        }
         shader::builtin().into_iter().try_for_each(|entry| self.add_shader(entry))
     }
 
@@ -129,6 +131,20 @@ impl Registry {
         check_name(&entry.declaration, Kind::Shader, taken)?;
         self.shaders.insert(entry);
         Ok(())
+    }
+
+    /// Sets what shaders of plugins must pass. This crate reads no sources itself, and takes all.
+    pub fn set_shader_check(&mut self, check: ShaderCheck) {
+        self.shader_check = Some(check);
+    }
+
+    pub(crate) fn check_shader(&self, entry: &ShaderEntry) -> Result<(), String> {
+        self.shader_check.as_ref().map_or(Ok(()), |check| check(entry))
+    }
+
+    /// Remembers why a shader that was found is not registered: whoever asks for it is told.
+    pub fn refuse_shader(&mut self, name: &str, refused: RefusedShader) {
+        self.shaders.refuse(name, refused);
     }
 
     /// Registers a shader with its source in WGSL.
@@ -402,60 +418,4 @@ fn check_name(declaration: &Declaration, kind: Kind, taken: Option<&Declaration>
         Some(there) => Err(RegisterError::Taken { kind: kind.name(), name, version: there.version.clone() }),
         None => Ok(()),
     }
-}
-
-fn block_declaration() -> Declaration {
-    let vec3 = |name, text| ParameterDecl::new(name, ParameterType::Vec3, text).unit("object units").required();
-    Declaration::new(Kind::Geometry, "block", env!("CARGO_PKG_VERSION"), "a box along the axes of object space")
-        .with(vec3("offset", "its lowest corner"))
-        .with(vec3("dimensions", "its lengths"))
-}
-
-fn vec3(parameters: &ParameterMap, name: &str) -> DVec3 {
-    match parameters.get(name) {
-        Some(ParameterValue::Vec3(v)) => *v,
-        _ => DVec3::NAN,
-    }
-}
-
-fn number(parameters: &ParameterMap, name: &str) -> f64 {
-    parameters.get(name).and_then(ParameterValue::as_float).unwrap_or(f64::NAN)
-}
-
-fn make_block(parameters: &ParameterMap) -> Result<Arc<dyn Geometry>, GeometryError> {
-    Ok(Arc::new(Block::new(vec3(parameters, "offset"), vec3(parameters, "dimensions"))?))
-}
-
-fn round_declaration(name: &str, text: &str) -> Declaration {
-    Declaration::new(Kind::Geometry, name, env!("CARGO_PKG_VERSION"), text)
-        .with(ParameterDecl::new("radius", ParameterType::Float, "its radius").unit("object units").required())
-        .with(
-            ParameterDecl::new("segments", ParameterType::Int, "flat faces around its axis")
-                .default(64i64)
-                .bounds(3.0, 1024.0),
-        )
-}
-
-fn sphere_declaration() -> Declaration {
-    let text = "a ball, as a polyhedron whose vertices lie on it";
-    round_declaration("sphere", text)
-        .with(ParameterDecl::new("center", ParameterType::Vec3, "its centre").unit("object units").required())
-}
-
-fn make_sphere(parameters: &ParameterMap) -> Result<Arc<dyn Geometry>, GeometryError> {
-    let (center, radius) = (vec3(parameters, "center"), number(parameters, "radius"));
-    Ok(Arc::new(Sphere::new(center, radius, number(parameters, "segments") as u32)?))
-}
-
-fn cylinder_declaration() -> Declaration {
-    let text = "a cylinder, as a prism whose edges lie on it";
-    let end = |name, text| ParameterDecl::new(name, ParameterType::Vec3, text).unit("object units").required();
-    round_declaration("cylinder", text)
-        .with(end("start", "one end of its axis"))
-        .with(end("end", "the other end of its axis"))
-}
-
-fn make_cylinder(parameters: &ParameterMap) -> Result<Arc<dyn Geometry>, GeometryError> {
-    let (ends, radius) = ([vec3(parameters, "start"), vec3(parameters, "end")], number(parameters, "radius"));
-    Ok(Arc::new(Cylinder::new(ends, radius, number(parameters, "segments") as u32)?))
 }

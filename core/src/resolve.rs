@@ -39,6 +39,9 @@ impl ResolvedShape {
     pub fn new(shape: &Shape, shaders: &ShaderCatalog) -> Result<Self, ActionError> {
         let state = shape.state();
         let name = shape.name().to_owned();
+        if let Some(refused) = shaders.refused(&state.shader) {
+            return Err(ActionError::Shader { shape: name, source: refused.why.clone().into() });
+        }
         let shader = shaders.get(&state.shader).ok_or_else(|| ActionError::UnknownShader {
             shape: name.clone(),
             shader: state.shader.clone(),

@@ -65,14 +65,26 @@ pub struct ShaderEntry {
     pub source: Option<Arc<ShaderText>>,
 }
 
+/// A shader that was found but cannot be used.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RefusedShader {
+    /// The file that it came from.
+    pub file: String,
+    /// Why, with the file's name.
+    pub why: String,
+}
+
 /// All shaders known, by name. Shared by reference.
 #[derive(Clone, Debug, Default)]
-pub struct ShaderCatalog(Arc<BTreeMap<String, Arc<ShaderEntry>>>);
+pub struct ShaderCatalog {
+    known: Arc<BTreeMap<String, Arc<ShaderEntry>>>,
+    refused: Arc<BTreeMap<String, RefusedShader>>,
+}
 
 impl ShaderCatalog {
     /// Adds a shader; `false` if the name is taken.
     pub fn insert(&mut self, entry: ShaderEntry) -> bool {
-        let map = Arc::make_mut(&mut self.0);
+        let map = Arc::make_mut(&mut self.known);
         let name = entry.declaration.name.clone();
         if map.contains_key(&name) {
             return false;
@@ -82,17 +94,33 @@ impl ShaderCatalog {
     }
 
     pub(crate) fn remove(&mut self, name: &str) {
-        Arc::make_mut(&mut self.0).remove(name);
+        Arc::make_mut(&mut self.known).remove(name);
+    }
+
+    /// Remembers why a name cannot be used. A shape that asks for it is refused with these words,
+    /// also where another shader has the name.
+    pub fn refuse(&mut self, name: &str, refused: RefusedShader) {
+        Arc::make_mut(&mut self.refused).insert(name.into(), refused);
+    }
+
+    /// Why a name cannot be used.
+    pub fn refused(&self, name: &str) -> Option<&RefusedShader> {
+        self.refused.get(name)
+    }
+
+    /// All that cannot be used, by name.
+    pub fn all_refused(&self) -> impl Iterator<Item = (&str, &RefusedShader)> {
+        self.refused.iter().map(|(name, refused)| (name.as_str(), refused))
     }
 
     /// The shader of that name.
     pub fn get(&self, name: &str) -> Option<&Arc<ShaderEntry>> {
-        self.0.get(name)
+        self.known.get(name)
     }
 
     /// All shaders in order of their names.
     pub fn iter(&self) -> impl Iterator<Item = &Arc<ShaderEntry>> {
-        self.0.values()
+        self.known.values()
     }
 
     /// Whether any shader declares a parameter of that name.

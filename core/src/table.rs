@@ -18,6 +18,10 @@ pub struct ControlPoint {
     pub opacity: f64,
 }
 
+/// How far a value may be from that of an entry and still mean it: places of equidistant entries
+/// are rounded.
+pub const ENTRY_REACH: f64 = 1.0 / 1024.0;
+
 /// Whether the table applies after or before interpolation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum TableInterpolation {
@@ -250,6 +254,21 @@ impl ResolvedTable {
         std::array::from_fn(|c| a[c] * (1.0 - t) + b[c] * t)
     }
 
+    /// Straight colour and opacity of the entry at a value: of the last control point within
+    /// [`ENTRY_REACH`] of it; transparent black where there is none. Nothing is interpolated, for
+    /// values that are names, like labels.
+    pub fn entry(&self, value: f64) -> [f64; 4] {
+        let after = self.points.partition_point(|p| p.value <= value + ENTRY_REACH);
+        let found = after.checked_sub(1).map(|i| &self.points[i]);
+        let found = found.filter(|p| value - p.value <= ENTRY_REACH);
+        found.map_or([0.0; 4], |p| [p.color[0], p.color[1], p.color[2], p.opacity])
+    }
+
+    /// Whether there is an entry at a value, as [`entry`](Self::entry) finds it.
+    pub fn has_entry(&self, value: f64) -> bool {
+        self.points.iter().any(|p| (value - p.value).abs() <= ENTRY_REACH)
+    }
+
     /// Highest opacity over the values `lo..=hi`; zero means that nothing there can be seen.
     pub fn max_opacity(&self, lo: f64, hi: f64) -> f64 {
         let first = self.points.partition_point(|p| p.value < lo);
@@ -296,6 +315,22 @@ mod tests {
         assert_eq!(table.classify(1.0)[3], 0.5);
         assert_eq!(table.max_opacity(0.0, 0.9), 0.0);
         assert_eq!(table.max_opacity(0.5, 1.5), 0.5);
+    }
+
+    /// Labels are names: what lies between two of them, beyond them, or is no number has no entry.
+    #[test]
+    fn entries_are_found_and_never_blended() {
+        let points = [point(3.0, 0.0, 0.25), point(1.0, 0.5, 0.5), point(3.0, 1.0, 0.75)];
+        let table = LookupTable::from_points(points).unwrap().resolve([0.0, 1.0]);
+        assert_eq!(table.entry(1.0), [0.5; 4]);
+        assert_eq!(table.entry(3.0), [1.0, 1.0, 1.0, 0.75]);
+        for value in [-1.0, 0.0, 2.0, 2.99, 3.01, 4.0, f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            assert_eq!((table.entry(value), table.has_entry(value)), ([0.0; 4], false), "{value}");
+        }
+        // Places of equidistant entries are rounded, and still whole.
+        let data: Vec<[f32; 4]> = (0..100).map(|i| [i as f32, 0.0, 0.0, 0.5]).collect();
+        let table = LookupTable::from_entries(data, Some([-7.0, 92.0])).unwrap().resolve([0.0, 1.0]);
+        assert!((0..100).all(|i| table.entry(f64::from(i) - 7.0) == [f64::from(i), 0.0, 0.0, 0.5]));
     }
 
     #[test]

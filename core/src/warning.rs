@@ -32,6 +32,8 @@ pub enum WarningCode {
     FileContent,
     /// Pixels whose certificate is wider than asked.
     NotCertified,
+    /// Labels of a segmentation that its table has no entry for.
+    LabelWithoutEntry,
     /// What a plugin says under a code of its own.
     Plugin,
 }
@@ -47,6 +49,7 @@ impl WarningCode {
             Self::SettingAdjusted => "setting-adjusted",
             Self::FileContent => "file-content",
             Self::NotCertified => "not-certified",
+            Self::LabelWithoutEntry => "label-without-entry",
             Self::Plugin => "plugin",
         }
     }

@@ -45,6 +45,11 @@ pub fn builtin() -> Result<Vec<ShaderEntry>, Problems> {
     SHIPPED.iter().map(read).collect()
 }
 
+/// Whether a shader of that name comes with Volact as a source.
+pub fn is_builtin(name: &str) -> bool {
+    SHIPPED.iter().any(|(shipped, ..)| *shipped == name)
+}
+
 fn read((name, ron, wgsl): &(&str, &str, &str)) -> Result<ShaderEntry, Problems> {
     let mut entry = ShaderFile::parse(name, ron).map_err(|problems| problems.of_file(format!("{name}.ron")))?.entry;
     entry.declaration.version = env!("CARGO_PKG_VERSION").into();

@@ -1,6 +1,10 @@
 //! What can be wrong with a shader, shown at its place in the author's file.
 
-use std::{fmt, io, ops::Range, path::PathBuf};
+use std::{
+    fmt, io,
+    ops::Range,
+    path::{Path, PathBuf},
+};
 
 use thiserror::Error;
 use volact_core::scene::{Problems, SceneError};
@@ -17,6 +21,14 @@ pub enum ShaderError {
         /// Why.
         source: io::Error,
     },
+    /// One of a shader's two files is not there.
+    #[error("{}: {} is missing beside it: a shader is a .ron and a .wgsl", there.display(), file_name(missing))]
+    Half {
+        /// The file that is there.
+        there: PathBuf,
+        /// The one that is not.
+        missing: PathBuf,
+    },
     /// The declaration is wrong, or declares what WGSL cannot have.
     #[error(transparent)]
     Declaration(#[from] Problems),
@@ -29,6 +41,11 @@ pub enum ShaderError {
         /// The shader's name.
         name: String,
     },
+}
+
+/// The last part of a path, as text.
+fn file_name(path: &Path) -> std::borrow::Cow<'_, str> {
+    path.file_name().unwrap_or_default().to_string_lossy()
 }
 
 impl From<SceneError> for ShaderError {

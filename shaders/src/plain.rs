@@ -76,7 +76,8 @@ fn source(program: &Program, function: &Function, uniforms: &Uniforms) -> Source
         });
         volumes.next().unwrap_or([0.0, 1.0])
     };
-    let of_table = matches!(function.derived, Derived::Medium | Derived::TableColor | Derived::Segment);
+    let of_table =
+        matches!(function.derived, Derived::Medium | Derived::TableColor | Derived::Entry | Derived::Segment);
     match value {
         Some(ParameterValue::Volume(texture)) => {
             let component = number("component").map_or(0, |c| c as usize);
@@ -168,6 +169,7 @@ impl Classified {
         let value = arguments.first().copied().unwrap_or(f64::NAN);
         match derived {
             Derived::TableColor => self.table.classify(value),
+            Derived::Entry => self.table.entry(value),
             Derived::Medium => self.medium(value),
             Derived::Segment => match *arguments {
                 [front, back, length] => self.segment(front, back, length),

@@ -32,6 +32,8 @@ pub enum Derived {
     Medium,
     /// A table's straight colour and opacity at a value.
     TableColor,
+    /// A table's straight colour and opacity at the entry of a value.
+    Entry,
     /// A table's mean medium over a segment.
     Segment,
     /// The number, vector, matrix or word itself.
@@ -167,6 +169,15 @@ pub const SIGNATURES: &[Signature] = &[
         "v: f32",
         "vec4<f32>",
         "straight colour and opacity at a value in data units",
+    ),
+    row(
+        ParameterType::Table,
+        Derived::Entry,
+        "_entry",
+        "v: f32",
+        "vec4<f32>",
+        "straight colour and opacity of the control point at that value (the last within 1/1024 of it), never \
+         interpolated; transparent black where there is none",
     ),
     row(
         ParameterType::Table,

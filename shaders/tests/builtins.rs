@@ -122,7 +122,7 @@ fn world(_: &str, derived: Derived, a: &[f64]) -> Vec<f64> {
         Derived::Nearest => vec![f(p()).round()],
         Derived::Gradient => slope(p()).to_array().to_vec(),
         Derived::Inside => vec![1.0],
-        Derived::TableColor => table(a[0]).to_vec(),
+        Derived::TableColor | Derived::Entry => table(a[0]).to_vec(),
         Derived::Medium => {
             let [r, g, b, a] = table(a[0]);
             vec![r, g, b, extinction(a, 0.5)]

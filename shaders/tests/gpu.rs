@@ -97,7 +97,7 @@ fn every_name_of_a_table_of_functions_is_there() {
     let text = "fn shade(s: Sample) -> Medium {
         let p = s.position;
         let one = v(p) + v_components(p).y + v_normalized(p) + v_color(p).z + v_gradient(p).x + v_nearest(p)
-            + v_coordinates(p).x + v_spacing() + t(1.0).extinction + t_color(2.0).r + t_segment(0.0, 1.0, 2.0).extinction
+            + v_coordinates(p).x + v_spacing() + t(1.0).extinction + t_color(2.0).r + t_entry(2.0).r + t_segment(0.0, 1.0, 2.0).extinction
             + unit_distance() + f32(i()) + v2().x + v3().y + v3_local().z + v4().w + c().r + m()[1].x + f32(w())
             + a(s) + a_components(s).x;
         if v_inside(p) && b() && v_given() && t_given() && w() == w_y { return medium(c().rgb, one); }

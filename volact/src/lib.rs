@@ -72,6 +72,7 @@ pub fn with_builtins() -> Registry {
     for loader in volact_files::loaders() {
         registry.add_loader(loader).expect("the names of built-ins are free");
     }
+    registry.set_shader_check(std::sync::Arc::new(shaders::check));
     shaders::add_builtin(&mut registry).expect("the names of built-ins are free");
     registry
 }

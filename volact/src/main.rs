@@ -52,6 +52,8 @@ fn start_log(verbose: u8, quiet: bool) {
     };
     env_logger::Builder::new()
         .filter_level(level)
+        // What naga finds wrong with a shader is told by the error, at its place.
+        .filter_module("naga", LevelFilter::Off)
         .parse_env("VOLACT_LOG")
         .format_timestamp(None)
         .format_target(verbose > 1)

@@ -1,35 +1,34 @@
 //! Shaders by their source: those that come with Volact, and those of folders.
 
-use std::{
-    fs, io,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
 use thiserror::Error;
-use volact_core::{Registry, registry::RegisterError};
-use volact_shaders::ShaderError;
+use volact_core::{Registry, ShaderEntry, parameter::Kind, registry::RegisterError, shader::RefusedShader};
+use volact_shaders::{Program, ShaderError};
 
-/// Why shaders of a folder are not registered.
+/// Why a shader of a folder is not registered.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum AddShaderError {
-    /// The folder cannot be read.
-    #[error("{}: cannot be read", path.display())]
-    Io {
-        /// The folder.
-        path: PathBuf,
-        /// Why.
-        source: io::Error,
-    },
-    /// A shader is wrong.
+    /// The folder cannot be read, or a shader is wrong.
     #[error(transparent)]
     Shader(#[from] ShaderError),
     /// Its name is taken.
-    #[error("{}", path.display())]
+    #[error("{}: a shader {name:?} is there already: {by}; call one of them otherwise", path.display())]
     Taken {
         /// The shader's file.
         path: PathBuf,
-        /// By whom.
+        /// Its name.
+        name: String,
+        /// What has the name.
+        by: String,
+    },
+    /// Its name cannot be used.
+    #[error("{}", path.display())]
+    Name {
+        /// The shader's file.
+        path: PathBuf,
+        /// Why.
         source: RegisterError,
     },
 }
@@ -48,24 +47,76 @@ pub fn add_builtin(registry: &mut Registry) -> Result<(), RegisterError> {
     Ok(())
 }
 
-/// Registers the shaders of a folder: each `name.wgsl` with its `name.ron`. A folder with neither
-/// adds nothing.
+/// What is wrong with a shader's source, for [`Registry::set_shader_check`].
 ///
 /// # Errors
-/// The first shader that is wrong or whose name is taken; those before it are registered.
-pub fn add_folder(registry: &mut Registry, folder: &Path) -> Result<(), AddShaderError> {
-    let io = |source| AddShaderError::Io { path: folder.into(), source };
-    let mut files = Vec::new();
-    for entry in fs::read_dir(folder).map_err(io)? {
-        let file = entry.map_err(io)?.path();
-        if file.extension().is_some_and(|e| e == "wgsl") && file.is_file() {
-            files.push(file);
+/// All that is wrong, at its place in the source.
+pub fn check(entry: &ShaderEntry) -> Result<(), String> {
+    match entry.source {
+        Some(_) => Program::new(entry).map(|_| ()).map_err(|error| error.to_string()),
+        None => Ok(()),
+    }
+}
+
+/// Registers the shaders of a folder: each `name.ron` with its `name.wgsl`. Other documents are passed
+/// over. Shaders that are wrong, or whose name is taken, change nothing for others: the registry keeps
+/// why they are refused and tells whoever asks for their name, and they are given back by file.
+///
+/// # Errors
+/// If the folder cannot be read.
+pub fn add_folder(registry: &mut Registry, folder: &Path) -> Result<Vec<AddShaderError>, AddShaderError> {
+    let mut refused = Vec::new();
+    for path in volact_shaders::source::announced(folder)? {
+        if let Err(error) = add_file(registry, &path) {
+            let name = name_of(&path);
+            registry.refuse_shader(&name, RefusedShader { file: wgsl(&path), why: chain(&error) });
+            refused.push(error);
         }
     }
-    files.sort();
-    for path in files {
-        let entry = volact_shaders::load(&path)?;
-        registry.add_shader(entry).map_err(|source| AddShaderError::Taken { path, source })?;
+    Ok(refused)
+}
+
+fn add_file(registry: &mut Registry, path: &Path) -> Result<(), AddShaderError> {
+    let name = name_of(path);
+    let taken = |by| AddShaderError::Taken { path: path.with_extension("wgsl"), name: name.clone(), by };
+    if let Some(by) = holder(registry, &name) {
+        return Err(taken(by));
     }
-    Ok(())
+    let entry = volact_shaders::load(path)?;
+    registry.add_shader(entry).map_err(|source| AddShaderError::Name { path: path.into(), source })
+}
+
+/// Who has a name already, in words.
+fn holder(registry: &Registry, name: &str) -> Option<String> {
+    if let Some(refused) = registry.shaders().refused(name) {
+        return Some(refused.file.clone());
+    }
+    let entry = registry.shaders().get(name)?;
+    if let Some(plugin) = registry.origin(Kind::Shader, name) {
+        return Some(format!("that of plugin {plugin:?}"));
+    }
+    let builtin = Registry::with_core().shaders().get(name).is_some() || volact_shaders::is_builtin(name);
+    Some(match &entry.source {
+        Some(source) if !builtin => source.file.clone(),
+        _ => "the one that comes with Volact".into(),
+    })
+}
+
+fn name_of(path: &Path) -> String {
+    path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+fn wgsl(path: &Path) -> String {
+    path.with_extension("wgsl").display().to_string()
+}
+
+/// An error with its causes.
+fn chain(error: &dyn std::error::Error) -> String {
+    let mut text = error.to_string();
+    let mut cause = error.source();
+    while let Some(error) = cause {
+        text.push_str(&format!(": {error}"));
+        cause = error.source();
+    }
+    text
 }

@@ -169,7 +169,7 @@ fn examples_are_small_and_complete() {
 fn truth(scene: &Scene, registry: &Registry) -> Vec<[f32; 4]> {
     let mut frame = scene.frame.clone();
     (frame.width, frame.height) = (24, 20);
-    let scene = Scene { shapes: scene.shapes.clone(), frame, action: None };
+    let scene = Scene { shapes: scene.shapes.clone(), frame, action: None, goals: scene.goals };
     draw(&scene, "reference", Options::new(), registry).color.into_vec()
 }
 

@@ -114,6 +114,89 @@ fn a_wrong_shader_is_shown_at_its_place_and_nothing_is_written() {
     assert!(!output.status.success() && err(&output).contains("lut"), "{}", err(&output));
 }
 
+/// A config's folder with a broken shader made every picture fail.
+#[test]
+fn a_wrong_shader_that_nobody_asks_for_is_a_warning() {
+    let folder = folder("looks");
+    let path = folder.path();
+    fs::write(path.join("config.ron"), "(version: 1, shader_folders: [\"looks\"])").unwrap();
+    fs::write(
+        path.join("looks/own.wgsl"),
+        "fn shade(s: Sample) -> Medium {\n    return lookup_table(volum(s.position));\n}\n",
+    )
+    .unwrap();
+    let config = ["--config", "config.ron"];
+    let shown = "own.wgsl:2:25: no definition in scope for identifier: `volum`\n 2 |     return lookup_table(volum(s.position));\n   |                         ^^^^^";
+    let output = draw(path, "lut.scene.ron", &config);
+    assert!(output.status.success(), "{}", err(&output));
+    assert!(path.join("out.npy").exists());
+    let told = ["shader \"own\" cannot be used", shown.lines().next().unwrap(), "^^^^^ unknown identifier"];
+    assert!(told.iter().all(|words| err(&output).contains(words)), "{}", err(&output));
+    // naga's own line in the log tells nothing more.
+    assert!(!err(&output).contains("ERROR"), "{}", err(&output));
+    fs::remove_file(path.join("out.npy")).unwrap();
+    let output = draw(path, "own.scene.ron", &config);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(err(&output).contains("own.scene.ron:1:") && err(&output).contains(shown), "{}", err(&output));
+    assert!(!path.join("out.npy").exists());
+    let describe = |more: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_volact"));
+        let command = command.current_dir(path).env("VOLACT_CONFIG", "config.ron").arg("describe").args(more);
+        command.output().unwrap()
+    };
+    let list = describe(&[]);
+    let text = String::from_utf8_lossy(&list.stdout).into_owned();
+    assert!(
+        list.status.success() && text.contains("\nrefused\n  shader own: ") && text.contains("own.wgsl:2:25"),
+        "{text}"
+    );
+    let one = describe(&["own"]);
+    assert!(one.status.code() == Some(2) && err(&one).contains(shown), "{}", err(&one));
+    assert!(describe(&["lut"]).status.success());
+}
+
+#[test]
+fn half_a_shader_says_which_file_is_missing() {
+    for (gone, there) in [("own.wgsl", "own.ron"), ("own.ron", "own.wgsl")] {
+        let folder = folder("");
+        fs::remove_file(folder.path().join(gone)).unwrap();
+        let output = draw(folder.path(), "own.scene.ron", &[]);
+        assert_eq!(output.status.code(), Some(2));
+        let wanted = format!("{there}: {gone} is missing beside it");
+        assert!(err(&output).contains(&wanted), "{wanted}: {}", err(&output));
+        assert!(draw(folder.path(), "lut.scene.ron", &[]).status.success());
+    }
+}
+
+#[test]
+fn two_shaders_of_one_name_are_an_error_with_both_files_where_they_are_asked_for() {
+    let folder = folder("looks");
+    let path = folder.path();
+    for file in ["own.ron", "own.wgsl"] {
+        fs::copy(path.join("looks").join(file), path.join(file)).unwrap();
+    }
+    fs::write(path.join("config.ron"), "(version: 1, shader_folders: [\"looks\"])").unwrap();
+    let config = ["--config", "config.ron"];
+    let output = draw(path, "own.scene.ron", &config);
+    assert_eq!(output.status.code(), Some(2));
+    let both = ["./own.wgsl: a shader \"own\" is there already: ", "looks/own.wgsl"];
+    assert!(both.iter().all(|file| err(&output).contains(file)), "{}", err(&output));
+    assert!(draw(path, "lut.scene.ron", &config).status.success());
+    // The scene's own folder in the config, however it is written, is the same folder.
+    fs::write(path.join("config.ron"), "(version: 1, shader_folders: [\"looks/..\"])").unwrap();
+    assert!(draw(path, "own.scene.ron", &config).status.success());
+}
+
+#[test]
+fn a_mark_of_byte_order_is_passed_over() {
+    let folder = folder("");
+    for (file, text) in [("own.ron", RON), ("own.wgsl", WGSL)] {
+        fs::write(folder.path().join(file), format!("\u{feff}{text}")).unwrap();
+    }
+    let output = draw(folder.path(), "own.scene.ron", &[]);
+    assert!(output.status.success(), "{}", err(&output));
+}
+
 /// The example's picture is what its scene gives.
 #[test]
 fn the_example_draws_its_picture() {

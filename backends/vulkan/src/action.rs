@@ -13,6 +13,7 @@ use volact_shaders::{
         mesh::surface::is_surface,
         scene::{Item, cut_short, overlapping, overrun},
     },
+    without_entry,
 };
 
 use crate::{
@@ -132,6 +133,7 @@ impl VulkanAction {
             Warning::new(WarningCode::SettingAdjusted, &s.name, message)
         };
         all.extend(drawn.iter().filter(unfiltered).map(warn));
+        all.extend(without_entry(drawn));
         all
     }
 

@@ -13,6 +13,7 @@ use volact_shaders::{
         mesh::surface::is_surface,
         scene::{Item, cut_short, overlapping, overrun},
     },
+    without_entry,
 };
 
 use crate::{
@@ -151,6 +152,7 @@ impl WgpuAction {
             frame.warnings.push(Warning::new(WarningCode::NothingVisible, NAME, message));
         }
         frame.warnings.extend(method::adjusted(&drawn, &self.drawing.volumes, &self.settings));
+        frame.warnings.extend(without_entry(&drawn));
         self.emit(&frame);
         frame.method = method::method(&drawn, &self.drawing.volumes, &submitted, &self.settings, &self.gpu);
         let stats = &mut frame.statistics;

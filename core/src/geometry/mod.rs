@@ -7,6 +7,7 @@
 mod aabb;
 mod adjacency;
 mod block;
+mod builtin;
 mod clip;
 mod mesh;
 mod points;
@@ -24,6 +25,7 @@ use thiserror::Error;
 pub use aabb::Aabb;
 pub use adjacency::{Adjacency, BOUNDARY};
 pub use block::Block;
+pub(crate) use builtin::builtin;
 pub use clip::{Clip, ClipRegion, Plane, Spans};
 pub use mesh::{CellType, CellTypes, Mesh};
 pub use points::Points;

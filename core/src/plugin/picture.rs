@@ -12,7 +12,7 @@ use super::{
 use crate::{Frame, FrameDesc, Pixels, Severity, Warning, WarningCode, frame::Rebuild};
 
 /// The codes of warnings that cross by their names.
-const WARNINGS: [WarningCode; 8] = [
+const WARNINGS: [WarningCode; 9] = [
     WarningCode::UnitDistanceDefaulted,
     WarningCode::UnusedParameter,
     WarningCode::CoarseSampling,
@@ -20,6 +20,7 @@ const WARNINGS: [WarningCode; 8] = [
     WarningCode::SettingAdjusted,
     WarningCode::FileContent,
     WarningCode::NotCertified,
+    WarningCode::LabelWithoutEntry,
     WarningCode::Plugin,
 ];
 

@@ -98,6 +98,11 @@ struct Check<'a> {
 impl<'a> Check<'a> {
     /// The declaration of that kind and name, or a problem.
     fn known(&mut self, kind: Kind, name: &str, path: &str) -> Option<&'a Declaration> {
+        if let Some(refused) = self.registry.shaders().refused(name).filter(|_| kind == Kind::Shader) {
+            let wanted = format!("one that can be used:\n{}", refused.why);
+            self.problems.push(self.scene.problem(path, format!("{name:?}, which is refused"), wanted));
+            return None;
+        }
         let all: Vec<_> = self.registry.declarations().into_iter().filter(|d| d.kind == kind).collect();
         let found = all.iter().find(|d| d.name == name).copied();
         if found.is_none() && !name.is_empty() {

@@ -8,6 +8,7 @@
 //! The grid is vertex-centred: sample *i* of *N* along an axis of the data ROI lies at
 //! *i*/(*N*−1) of the geometry ROI's extent.
 
+mod labels;
 mod scalar;
 mod texture;
 
@@ -23,6 +24,7 @@ use glam::{DAffine3, DVec3};
 use thiserror::Error;
 
 use crate::{Aabb, Buffer};
+pub use labels::Labels;
 pub use scalar::ScalarType;
 use texture::roi_extent;
 pub use texture::{Components, Filter, Roi, VolumeTexture};
@@ -165,6 +167,7 @@ struct Inner {
     desc: VolumeDesc,
     data: Buffer,
     range: std::sync::Mutex<Option<(u64, Option<[f64; 2]>)>>,
+    labels: labels::Cache,
 }
 
 impl Volume {
@@ -181,7 +184,7 @@ impl Volume {
         }
         let id = next_version();
         let version = AtomicU64::new(next_version());
-        Ok(Self(Arc::new(Inner { id, version, desc, data, range: Default::default() })))
+        Ok(Self(Arc::new(Inner { id, version, desc, data, range: Default::default(), labels: Default::default() })))
     }
 
     /// What identifies the data: shapes with the same id share one resident copy.

@@ -322,6 +322,7 @@ fn accessor(derived: Derived, module: &Module, stub: Handle<Function>) -> &'stat
         Derived::Spacing => "volact_spacing",
         Derived::Medium => "volact_medium",
         Derived::TableColor => "volact_table_color",
+        Derived::Entry => "volact_entry",
         Derived::Segment => "volact_segment",
         Derived::Local => "volact_local",
         Derived::Given => "volact_given",

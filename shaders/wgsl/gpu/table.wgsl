@@ -34,6 +34,24 @@ fn volact_table_color(v: f32) -> vec4<f32> {
     return a + ((v - place.x) * place.y) * (b - a);
 }
 
+// How far a value may be from that of an entry and still mean it.
+const VOLACT_REACH: f32 = 1.0 / 1024.0;
+
+// The entry at a value, not interpolated; transparent black where there is none.
+fn volact_entry(v: f32) -> vec4<f32> {
+    if volact_is_nan(v) { return vec4<f32>(0.0); }
+    let base = volact_numbers[ROW].x;
+    let head = volact_cell(base);
+    let count = volact_tables[base].w;
+    let points = base + 2u + (volact_tables[base + 1u].x + 3u) / 4u;
+    let reached = v + VOLACT_REACH;
+    if reached < head.x { return vec4<f32>(0.0); }
+    var i = count - 1u;
+    if reached < head.y { i = volact_point(reached, head, base, points, count); }
+    if v - volact_cell(points + 2u * i).x > VOLACT_REACH { return vec4<f32>(0.0); }
+    return volact_cell(points + 2u * i + 1u);
+}
+
 fn volact_medium(v: f32) -> Medium {
     let c = volact_table_color(v);
     if !LENGTHS { return Medium(c.rgb, c.a); }

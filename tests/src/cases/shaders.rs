@@ -238,6 +238,28 @@ fn several(topic: &mut Topic) {
             rig.lattice("picture", &around([Shape::new(block, look)]), &How::step(0.37)).map(|_| ())
         });
     }
+    let about = "a label without an entry is not drawn, wherever among the others it lies";
+    topic.needing(&[Need::Shader("labels")], "labels_without_an_entry", about, move |rig| {
+        // Labels run 0 to 3 along x; rays go through one of them, over a length of 4.
+        let data = volume([8, 5, 3], ScalarType::U8, |p| (p.x / 2.0).floor());
+        let entry = |label: f64, opacity: f64| (label, [1.0, label / 4.0, 0.5], opacity);
+        for (which, known) in
+            [("those around it", vec![0.0, 1.0, 3.0]), ("those below", vec![3.0]), ("those above", vec![0.0])]
+        {
+            let table = colors(&known.iter().map(|label| entry(*label, 0.5)).collect::<Vec<_>>());
+            let look = Appearance::new("labels").with("labels", VolumeTexture::new(&data));
+            // `Shape::around` would give the labels as values, too.
+            let block = volact_core::Block::new(DVec3::ZERO, DVec3::new(7.0, 4.0, 2.0)).expect("a block");
+            let shape = Shape::new(block, look.with("label_table", table).with("unit_distance", 1.0));
+            for label in [0.0, 1.0, 2.0, 3.0] {
+                let seen = if known.contains(&label) { 1.0 - 0.5f64.powi(4) } else { 0.0 };
+                let wanted = [seen, seen * label / 4.0, seen * 0.5, seen];
+                let scene = Scene::new([shape.clone()], along_y(2.0 * label + 0.4, 1.0));
+                rig.pixel(&format!("label {label} in a table of {which}"), &scene, &How::step(0.5), wanted)?;
+            }
+        }
+        Ok(())
+    });
     for inside in [true, false] {
         let name = if inside { "blend2_in_one_place" } else { "blend2_of_a_smaller_volume" };
         let about = "two volumes in one place: extinctions add; the second counts where it is";

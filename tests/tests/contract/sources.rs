@@ -12,7 +12,7 @@ use volact_conformance::{
 use volact_core::{
     Appearance, Block, Camera, Clip, ClipRegion, Compositing, Declaration, FrameDesc, Geometry, LookupTable,
     ParameterDecl, ParameterType, Plane, Registry, ScalarType, ShaderEntry, ShaderText, Shape, SliceStyle, Sliced,
-    Slices, Volume, VolumeDesc, VolumeTexture,
+    Slices, Volume, VolumeDesc, VolumeTexture, WarningCode,
     glam::{DAffine3, DQuat, DVec3},
     parameter::Kind,
 };
@@ -154,16 +154,21 @@ fn gradient_is_lit_as_its_source_says() {
     }
 }
 
-/// Shaders without a kernel, in f32 and in f64 on the same lattice.
-#[test]
-fn sources_in_f32_are_those_in_f64() {
-    let mut random = Random(23);
+/// A registry with the sources of all shaders that come with Volact.
+fn every_shader() -> Registry {
     let mut all = registry();
     for entry in volact_shaders::builtin().unwrap() {
         if all.shaders().get(&entry.declaration.name).is_none() {
             all.add_shader(entry).unwrap();
         }
     }
+    all
+}
+
+/// Shaders without a kernel, in f32 and in f64 on the same lattice.
+#[test]
+fn sources_in_f32_are_those_in_f64() {
+    let (mut random, all) = (Random(23), every_shader());
     for round in 0..4 {
         let data = noise(&mut random, [ScalarType::U8, ScalarType::F32][round % 2], true);
         let other = noise(&mut random, ScalarType::U16, true);
@@ -172,7 +177,9 @@ fn sources_in_f32_are_those_in_f64() {
         let look = |name: &str| Appearance::new(name).with("volume", texture.clone());
         let lit = |name: &str| look(name).with("lookup_table", table()).with("unit_distance", 1.0);
         let steep = colors(&[(0.0, [0.5; 3], 0.0), (30.0, [1.0; 3], 1.0)]);
-        let labels = colors(&[(0.0, [0.0; 3], 0.0), (120.0, [1.0, 0.2, 0.2], 0.3), (200.0, [0.2, 1.0, 0.2], 0.2)]);
+        // Every third label has no entry.
+        let known = (0..256).map(f64::from).filter(|label| label % 3.0 != 0.0);
+        let labels = colors(&known.map(|label| (label, [label / 256.0, 0.5, 0.2], 0.3)).collect::<Vec<_>>());
         let looks = [
             lit("gradient").with("light", "directional").with("lightdir", DVec3::new(0.3, -0.5, 0.8)),
             lit("gradient").with("model", "phong"),
@@ -199,6 +206,33 @@ fn sources_in_f32_are_those_in_f64() {
             let far = off.iter().filter(|e| **e > 2e-4).count();
             assert!(far <= allowed, "{shader}, round {round}: {far} pixels are off by more than 2e-4: {off:?}");
         }
+    }
+}
+
+/// Labels 0 to 3 side by side and a table of 1 and 3: 2 was once drawn as a blend of the two, and
+/// nobody was told. 0 is the background, which needs no entry.
+#[test]
+fn labels_without_an_entry_are_named_and_not_drawn() {
+    let data = volume([8, 3, 3], ScalarType::U8, |p| (p.x / 2.0).floor());
+    let all = every_shader();
+    let drawn = |setup: Setup, known: &[f64]| {
+        let table = colors(&known.iter().map(|label| (*label, [1.0; 3], 1.0)).collect::<Vec<_>>());
+        let look = Appearance::new("labels").with("labels", VolumeTexture::new(&data)).with("label_table", table);
+        let block = Block::new(DVec3::ZERO, DVec3::new(7.0, 2.0, 2.0)).unwrap();
+        let shape = Shape::new(block, look.with("unit_distance", 1.0));
+        let frame = draw(&mut *setup.action_in(&all), std::slice::from_ref(&shape), &along_y(4.5, 1.0)).unwrap();
+        let told = frame.warnings.iter().filter(|w| w.code == WarningCode::LabelWithoutEntry);
+        (frame.color[0], told.map(|w| w.message.clone()).collect::<Vec<_>>())
+    };
+    let setups: [fn() -> Setup; 3] = [|| Setup::post(0.5), || Setup::rays(0.5), Setup::exact];
+    for setup in setups {
+        let (color, told) = drawn(setup(), &[1.0, 3.0]);
+        assert_eq!(color, [0.0; 4]);
+        assert_eq!(told, ["label 2 of \"volume\" has no entry in \"label_table\" and is not drawn"]);
+        let (color, told) = drawn(setup(), &[2.0]);
+        assert_eq!(color, [1.0; 4]);
+        assert_eq!(told, ["labels 1, 3 of \"volume\" have no entry in \"label_table\" and are not drawn"]);
+        assert!(drawn(setup(), &[1.0, 2.0, 3.0]).1.is_empty());
     }
 }
 

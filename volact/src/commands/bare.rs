@@ -10,6 +10,7 @@ use volact::{
     core::{
         Compositing,
         glam::DVec3,
+        planner::Goals,
         scene::{DataSpec, KeptData, ParameterSpec, Scene},
     },
     transfer,
@@ -48,7 +49,7 @@ pub fn open(
     change(args, &shape, registry)?;
     slice(args, &shape)?;
     let frame = frame.with_background(args.background.unwrap_or(config.background));
-    Ok((Scene { shapes: vec![shape], frame, action: None }, notes))
+    Ok((Scene { shapes: vec![shape], frame, action: None, goals: Goals::default() }, notes))
 }
 
 fn load(args: &Args, registry: &Registry, kept: &mut KeptData) -> anyhow::Result<Data> {

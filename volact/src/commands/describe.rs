@@ -43,9 +43,12 @@ pub fn run(args: Args, registry: &Registry) -> anyhow::Result<ExitCode> {
     }
     let text = match &args.name {
         None if args.all => all.iter().map(|d| full(d, registry)).collect::<Vec<_>>().join("\n"),
-        None => list(&all),
+        None => list(&all) + &refused(registry),
         Some(name) => {
             let found: Vec<_> = all.iter().copied().filter(|d| d.name == *name).collect();
+            if let Some(refused) = registry.shaders().refused(name) {
+                bail!("shader {name:?} cannot be used: {}", refused.why);
+            }
             if found.is_empty() {
                 let hint = names::hint(name, all.iter().map(|d| d.name.as_str()));
                 bail!("nothing is called {name:?}{hint}; `volact describe` lists all names");
@@ -70,6 +73,16 @@ fn list(all: &[&Declaration]) -> String {
         for d in of_kind {
             _ = writeln!(text, "  {:width$}  {}", d.name, d.description);
         }
+    }
+    text
+}
+
+/// Shaders in the folders that cannot be used, and why.
+fn refused(registry: &Registry) -> String {
+    let mut text = String::new();
+    for (name, refused) in registry.shaders().all_refused() {
+        let gap = if text.is_empty() { "\nrefused\n" } else { "" };
+        _ = writeln!(text, "{gap}  shader {name}: {}", refused.why.replace('\n', "\n    "));
     }
     text
 }

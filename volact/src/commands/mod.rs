@@ -21,10 +21,14 @@ pub mod verify;
 pub mod watch;
 
 use std::{
+    collections::BTreeSet,
     io::Write,
     path::{Path, PathBuf},
     process::ExitCode,
-    sync::atomic::{AtomicBool, Ordering},
+    sync::{
+        Mutex, PoisonError,
+        atomic::{AtomicBool, Ordering},
+    },
 };
 
 use clap::Subcommand;
@@ -98,7 +102,8 @@ impl Command {
             _ => return Ok(()),
         };
         for folder in shader_folders(&settings::config(named)?, &scenes) {
-            volact::shaders::add_folder(registry, &folder)?;
+            let refused = volact::shaders::add_folder(registry, &folder)?;
+            log::debug!("{}: {} shaders refused", folder.display(), refused.len());
         }
         Ok(())
     }
@@ -121,14 +126,23 @@ impl Command {
 
 /// Where shaders are: the config's folders, and those of the scenes.
 fn shader_folders(config: &Config, scenes: &[&Path]) -> Vec<PathBuf> {
-    let mut folders = config.shader_folders.clone();
-    for beside in scenes.iter().filter_map(|scene| scene.parent()) {
-        let beside = if beside.as_os_str().is_empty() { Path::new(".") } else { beside };
-        if beside.is_dir() && !folders.iter().any(|folder| folder == beside) {
-            folders.push(beside.into());
+    let beside = scenes.iter().filter_map(|scene| scene.parent());
+    let beside = beside.map(|beside| if beside.as_os_str().is_empty() { Path::new(".") } else { beside });
+    let beside = beside.filter(|folder| folder.is_dir()).map(Path::to_owned);
+    // A folder that is named twice, in whatever way, is searched once.
+    let mut known = BTreeSet::new();
+    let place = |folder: &PathBuf| std::fs::canonicalize(folder).unwrap_or_else(|_| folder.clone());
+    config.shader_folders.iter().cloned().chain(beside).filter(|folder| known.insert(place(folder))).collect()
+}
+
+/// Warns, once each, of shaders in the folders that cannot be used.
+fn warn_of_shaders(registry: &volact::Registry) {
+    static SAID: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
+    for (name, refused) in registry.shaders().all_refused() {
+        if SAID.lock().unwrap_or_else(PoisonError::into_inner).insert(refused.why.clone()) {
+            log::warn!("shader {name:?} cannot be used: {}", refused.why);
         }
     }
-    folders
 }
 
 /// Where the user or the system ends the command, no part of a picture stays behind.

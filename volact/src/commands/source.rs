@@ -162,6 +162,7 @@ impl Args {
             true => (self.scene(registry, &config, kept)?, Vec::new()),
             false => bare::open(self, registry, &config, kept)?,
         };
+        super::warn_of_shaders(registry);
         let bounds = bounds(&scene.shapes);
         for cut in &self.clip {
             scene.frame.clip = scene.frame.clip.with(cut.region(&bounds)?);

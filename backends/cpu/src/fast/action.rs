@@ -11,6 +11,7 @@ use volact_core::{
     parameter::{ParameterProblem, ProblemKind},
     resolve::ResolvedShape,
 };
+use volact_shaders::without_entry;
 
 use super::{
     check::{self, NAME, check},
@@ -166,6 +167,7 @@ impl RenderAction for CpuAction {
         }
         frame.warnings.extend(method::coarse(&drawn, plan.step, &self.resources));
         frame.warnings.extend(method::adjusted(&drawn, &self.resources, &self.settings));
+        frame.warnings.extend(without_entry(&drawn));
         for warning in frame.warnings.iter().filter(|w| w.severity == Severity::Warning) {
             if self.said.insert(warning.to_string()) {
                 warning.emit();

@@ -6,6 +6,7 @@ use volact_core::{
     ActionError, Caps, Compositing, Context, Declaration, Frame, FrameDesc, Options, ParameterValue, RenderAction,
     Shape, Statistics, Warning, WarningCode, lifecycle::Lifecycle, parameter::ParameterProblem, resolve::ResolvedShape,
 };
+use volact_shaders::without_entry;
 
 use super::{
     options::{Classification, Method, NAME, ReferenceOptions, declaration},
@@ -43,6 +44,7 @@ impl ReferenceAction {
         frame.color = picture.color.iter().map(|c| c.map(|v| v as f32)).collect();
         frame.depth = picture.depth.iter().map(|d| *d as f32).collect();
         frame.warnings = shapes.iter().flat_map(|s| s.warnings.clone()).collect();
+        frame.warnings.extend(without_entry(&shapes.iter().collect::<Vec<_>>()));
         frame.method = self.method(!picture.estimated.is_empty());
         if self.options.method == Method::Exact {
             let report = certificate(picture, &self.options);

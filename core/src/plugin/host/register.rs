@@ -149,7 +149,11 @@ fn take(
         }
         let added = match item {
             Item::Action(factory) => next.add_action(declaration, factory),
-            Item::Shader(entry) => next.add_shader(entry),
+            Item::Shader(entry) => {
+                let wrong = |why| Fault::new(Code::BadValue, format!("shader {name:?} cannot be used: {why}"));
+                next.check_shader(&entry).map_err(wrong)?;
+                next.add_shader(entry)
+            }
             Item::Geometry(factory) => next.add_geometry(declaration, factory),
             Item::Loader(loader) => next.add_loader(loader),
         };

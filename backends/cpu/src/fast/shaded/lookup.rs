@@ -3,7 +3,10 @@
 
 #![expect(unsafe_code, reason = "kernels of a vector unit")]
 
-use volact_core::{ControlPoint, table::ResolvedTable};
+use volact_core::{
+    ControlPoint,
+    table::{ENTRY_REACH, ResolvedTable},
+};
 
 use super::batch::ROWS;
 use crate::fast::{
@@ -255,6 +258,19 @@ impl Lookup {
         after
     }
 
+    /// Straight colour and opacity of the entries at values, not interpolated; transparent black
+    /// where there are none. Rows that nobody wants are empty.
+    pub fn entries(&self, values: &[f32], out: &mut [&mut [f32]]) {
+        let reach = ENTRY_REACH as f32;
+        for (i, value) in values.iter().enumerate() {
+            // The line after a point begins with the point's own numbers.
+            let after = self.search(value + reach);
+            let found = after > 0 && value - self.values[after - 1] <= reach;
+            let rgba = if found { self.lines[after][0] } else { [0.0; 4] };
+            out.iter_mut().zip(rgba).for_each(|(row, v)| row.get_mut(i).into_iter().for_each(|to| *to = v));
+        }
+    }
+
     /// Straight colour and opacity of sixteen values; NaN for NaN.
     ///
     /// # Safety
@@ -404,7 +420,7 @@ mod tests {
                 rows.map(|row| f64::from(row[LANES - 1]))
             };
             for points in [few.clone(), many.clone(), faint.clone(), soft.clone()] {
-                let table = LookupTable::from_points(points).unwrap().resolve([0.0, 1.0]);
+                let table = LookupTable::from_points(points.clone()).unwrap().resolve([0.0, 1.0]);
                 let lookup = Lookup::new(&table, 2.5);
                 let extremes = [f32::INFINITY, f32::NEG_INFINITY, 1e30, -1e30, f32::MAX, 0.0];
                 let values: Vec<f32> = (-400..10_000).map(|i| i as f32 * 0.01).chain(extremes).collect();
@@ -415,6 +431,14 @@ mod tests {
                     let wanted = if a >= 1.0 { f64::INFINITY } else { -(-a).ln_1p() / 2.5 };
                     let close = sigma == wanted || (sigma - wanted).abs() <= 4e-7 * wanted + 2e-6;
                     assert!(close, "{unit:?}: opacity {a} has {sigma}, not {wanted}");
+                }
+                let places = points.iter().flat_map(|p| [-0.5, -0.0011, 0.0, 0.0005, 0.5].map(|d| p.value + d));
+                let names: Vec<f32> = places.map(|v| v as f32).chain(extremes).chain([f32::NAN]).collect();
+                let mut rows = vec![vec![0f32; names.len()]; 4];
+                lookup.entries(&names, &mut rows.iter_mut().map(Vec::as_mut_slice).collect::<Vec<_>>());
+                for (i, value) in names.into_iter().enumerate() {
+                    let wanted = table.entry(f64::from(value)).map(|v| v as f32);
+                    assert_eq!([0, 1, 2, 3].map(|c: usize| rows[c][i]), wanted, "the entry of {value}");
                 }
                 assert!(look(&lookup, f32::NAN, true).iter().all(|v| v.is_nan()));
             }

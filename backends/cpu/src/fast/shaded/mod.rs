@@ -199,7 +199,8 @@ impl Shader {
 
     /// Makes the tables that it looks up in ready, as far as they changed; says so.
     pub fn prepare_tables(&mut self, shape: &ResolvedShape, mut say: impl FnMut(&str, usize)) {
-        let of = |function: &Function| matches!(function.derived, Derived::Medium | Derived::TableColor);
+        let of =
+            |function: &Function| matches!(function.derived, Derived::Medium | Derived::TableColor | Derived::Entry);
         let asked = self.kernels().flat_map(|kernel| kernel.functions()).filter(|f| of(f)).map(|f| f.parameter);
         let parameters = &self.entry.declaration.parameters;
         let names: Vec<String> = asked.filter_map(|i| Some(parameters.get(i)?.name.clone())).collect();

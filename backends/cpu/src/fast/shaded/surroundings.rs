@@ -29,6 +29,7 @@ enum Answer<'a> {
     Coordinates(Field<'a>),
     Medium(&'a Lookup),
     Color4(&'a Lookup),
+    Entry(&'a Lookup),
     /// The table in f64, and its unit distance.
     Segment(Segments),
     /// A volume that was left out.
@@ -100,6 +101,7 @@ fn classified<'a>(shape: &ResolvedShape, shader: &'a Shader, name: &str, derived
     match derived {
         Derived::Medium => shader.lookup(name).map(Answer::Medium),
         Derived::TableColor => shader.lookup(name).map(Answer::Color4),
+        Derived::Entry => shader.lookup(name).map(Answer::Entry),
         Derived::Segment => {
             let (table, range) = table_of(shape, name);
             let unit = shape.float("unit_distance").unwrap_or(1.0);
@@ -151,6 +153,7 @@ impl Environment<f32> for Asked<'_, '_> {
             }
             Answer::Medium(table) => dispatch::classified(unit, table, rows[0], out, true),
             Answer::Color4(table) => dispatch::classified(unit, table, rows[0], out, false),
+            Answer::Entry(table) => table.entries(rows[0], out),
             Answer::Nothing => out.iter_mut().for_each(|row| row.fill(0.0)),
         }
     }
