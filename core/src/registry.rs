@@ -229,9 +229,9 @@ impl Registry {
     /// If nobody registered the name, options are wrong, or the action cannot run here.
     pub fn action(&self, name: &str, options: &Options) -> Result<Box<dyn RenderAction>, ActionError> {
         let (declaration, factory) = self.actions.get(name).ok_or_else(|| self.unknown_action(name))?;
-        let context = Context { shaders: self.shaders.clone(), progress: self.progress.clone() };
+        let context = self.context();
         if name == "planned" {
-            return self.planned(&context, options);
+            return Ok(Box::new(self.planned(options)?));
         }
         if name == "checked" {
             let mut inner = options.clone();
@@ -253,9 +253,16 @@ impl Registry {
         factory(&context, &options)
     }
 
+    fn context(&self) -> Context {
+        Context { shaders: self.shaders.clone(), progress: self.progress.clone() }
+    }
+
     /// Makes the action that plans for those which its option `of` names, with the options that are not its own.
     /// Errors are taken from `cpu` where that is known, which interpolates and accumulates in f32 throughout.
-    fn planned(&self, context: &Context, options: &Options) -> Result<Box<dyn RenderAction>, ActionError> {
+    ///
+    /// # Errors
+    /// As [`Self::action`].
+    pub fn planned(&self, options: &Options) -> Result<PlannedAction, ActionError> {
         let declaration = planner::declaration();
         let own = |name: &str| declaration.parameter(name).is_some();
         let (given, passed): (Options, Options) = options.clone().into_iter().partition(|(name, _)| own(name));
@@ -280,7 +287,27 @@ impl Registry {
         if actors.is_empty() {
             return Err(self.unknown_action(of));
         }
-        Ok(Box::new(PlannedAction::new(context, (actors, self.truth()), given, self.rates.clone())?))
+        PlannedAction::new(&self.context(), (actors, self.truth()), given, self.rates.clone())
+    }
+
+    /// Makes an action that keeps goals: the one of this name, planned for. Without goals it is [`Self::action`].
+    ///
+    /// # Errors
+    /// As [`Self::action`].
+    pub fn action_for(
+        &self,
+        name: &str,
+        options: &Options,
+        goals: &Goals,
+    ) -> Result<Box<dyn RenderAction>, ActionError> {
+        match (*goals == Goals::default(), name) {
+            (true, _) => self.action(name, options),
+            (false, "planned") => self.action(name, &goals.above(options)),
+            (false, _) => {
+                let actor = Actor::new(name, self.action(name, options)?, options.clone());
+                Ok(Box::new(self.plan_for(vec![actor], goals)?))
+            }
+        }
     }
 
     /// Plans for actions that are made already, with their options, to goals.
@@ -288,8 +315,7 @@ impl Registry {
     /// # Errors
     /// None that goals of this type can have.
     pub fn plan_for(&self, actors: Vec<Actor>, goals: &Goals) -> Result<PlannedAction, ActionError> {
-        let context = Context { shaders: self.shaders.clone(), progress: self.progress.clone() };
-        PlannedAction::new(&context, (actors, self.truth()), goals.options(), self.rates.clone())
+        PlannedAction::new(&self.context(), (actors, self.truth()), goals.options(), self.rates.clone())
     }
 
     /// Who draws what errors are taken from.

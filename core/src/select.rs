@@ -8,21 +8,21 @@ use thiserror::Error;
 use crate::{
     ActionError, Caps, Compositing, Options, Registry, RenderAction, Shape,
     config::Config,
-    planner::{Actor, Goals},
+    planner::{Actor, Goals, PlannedAction},
     resolve::ResolvedShape,
 };
 
 /// An action that can draw a scene and manages its shapes.
-pub struct Choice {
+pub struct Choice<A = Box<dyn RenderAction>> {
     /// Its registered name.
     pub name: String,
     /// The action, which manages all shapes.
-    pub action: Box<dyn RenderAction>,
+    pub action: A,
     /// The actions that were preferred but not taken, with the reasons.
     pub refused: Vec<(String, String)>,
 }
 
-impl fmt::Debug for Choice {
+impl<A> fmt::Debug for Choice<A> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Choice").field("name", &self.name).field("refused", &self.refused).finish_non_exhaustive()
     }
@@ -102,9 +102,7 @@ pub fn select(
     })
 }
 
-/// As [`select`], for goals: the action named, or all preferred ones that can draw and run on no
-/// [software](SOFTWARE) device, are planned for, and the cheapest settings of all keep the goals.
-/// Without goals it is [`select`].
+/// As [`select`], for goals: what [`select_planned`] finds. Without goals it is [`select`].
 ///
 /// # Errors
 /// As [`select`].
@@ -118,27 +116,58 @@ pub fn select_for(
     if *goals == Goals::default() {
         return select(registry, config, named, options, shapes);
     }
+    let planned = select_planned(registry, config, named, options, (goals, shapes))?;
+    Ok(Choice { name: planned.name, action: Box::new(planned.action), refused: planned.refused })
+}
+
+/// The planner for goals: of the action named, or of all preferred ones that can draw and run on no
+/// [software](SOFTWARE) device, from which the cheapest settings are chosen frame by frame. It manages all shapes.
+///
+/// # Errors
+/// As [`select`].
+pub fn select_planned(
+    registry: &Registry,
+    config: &Config,
+    named: Option<&str>,
+    options: &Options,
+    (goals, shapes): (&Goals, &[Shape]),
+) -> Result<Choice<PlannedAction>, SelectError> {
+    let (name, mut action, refused) = if named == Some("planned") {
+        let action = registry.planned(&goals.above(&config.options_of("planned", options)))?;
+        ("planned".to_owned(), action, Vec::new())
+    } else {
+        let (actors, refused) = actors(registry, config, named, options, shapes)?;
+        let names: Vec<_> = actors.iter().map(|a| a.name.clone()).collect();
+        (format!("planned of {}", names.join(" ")), registry.plan_for(actors, goals)?, refused)
+    };
+    shapes.iter().try_for_each(|shape| action.manage(shape))?;
+    Ok(Choice { name, action, refused })
+}
+
+/// The action that [`select`] takes and, where none is named, the others that could.
+fn actors(
+    registry: &Registry,
+    config: &Config,
+    named: Option<&str>,
+    options: &Options,
+    shapes: &[Shape],
+) -> Result<(Vec<Actor>, Vec<(String, String)>), SelectError> {
     let first = select(registry, config, named, options, shapes)?;
     let mut refused = first.refused;
-    let mut names = vec![first.name.clone()];
     let given = config.options_of(&first.name, options);
     let mut actors = vec![Actor::new(&first.name, first.action, given)];
-    let tried = |name: &String| *name == names[0] || refused.iter().any(|(other, _)| other == name);
-    let further: Vec<_> = config.prefer.iter().filter(|name| named.is_none() && !tried(name)).collect();
-    for name in further {
+    for name in config.prefer.iter().filter(|_| named.is_none()) {
+        if *name == first.name || refused.iter().any(|(other, _)| other == name) {
+            continue;
+        }
         let given = config.options_of(name, options);
         match attempt(registry, name, &given, shapes) {
-            Ok(action) if !action.caps().device.starts_with(SOFTWARE) => {
-                names.push(name.clone());
-                actors.push(Actor::new(name, action, given));
-            }
+            Ok(action) if !action.caps().device.starts_with(SOFTWARE) => actors.push(Actor::new(name, action, given)),
             Ok(action) => refused.push((name.clone(), format!("{NO_DEVICE} that is a GPU ({})", action.caps().device))),
             Err(why) => refused.push((name.clone(), why)),
         }
     }
-    let mut action: Box<dyn RenderAction> = Box::new(registry.plan_for(actors, goals)?);
-    shapes.iter().try_for_each(|shape| action.manage(shape))?;
-    Ok(Choice { name: format!("planned of {}", names.join(" ")), action, refused })
+    Ok((actors, refused))
 }
 
 fn attempt(

@@ -1,6 +1,9 @@
 //! Who is tested: an action of a registry, with options of the user's choice.
 
-use volact_core::{ActionError, Caps, Declaration, Options, ParameterValue, Registry, RenderAction, parameter::Kind};
+use volact_core::{
+    ActionError, Caps, Declaration, Options, ParameterValue, Registry, RenderAction, parameter::Kind,
+    planner::knobs::word,
+};
 
 /// An action under test.
 #[derive(Clone, Debug)]
@@ -56,16 +59,5 @@ impl Subject {
             }
         }
         registry.action(&self.action, &options)
-    }
-}
-
-/// A value as a user writes it.
-pub(crate) fn word(value: &ParameterValue) -> String {
-    match value {
-        ParameterValue::Choice(word) => word.clone(),
-        ParameterValue::Bool(b) => b.to_string(),
-        ParameterValue::Int(i) => i.to_string(),
-        ParameterValue::Float(f) => f.to_string(),
-        other => format!("{other:?}"),
     }
 }

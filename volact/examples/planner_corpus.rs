@@ -328,23 +328,7 @@ fn row(name: &str, bound: &str, o: &Outcome) -> String {
     )
 }
 
-struct L;
-impl log::Log for L {
-    fn enabled(&self, _: &log::Metadata) -> bool {
-        true
-    }
-    fn log(&self, r: &log::Record) {
-        if r.level() == log::Level::Trace {
-            eprintln!("{}", r.args())
-        }
-    }
-    fn flush(&self) {}
-}
 fn main() -> Result<(), Failed> {
-    if std::env::var("TR").is_ok() {
-        log::set_logger(&L).unwrap();
-        log::set_max_level(log::LevelFilter::Trace);
-    }
     let data = PathBuf::from(std::env::var("VOLACT_DATA").map_err(|_| "set VOLACT_DATA to the folder of the data")?);
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let output = arguments.first().ok_or("name a file for the table")?;

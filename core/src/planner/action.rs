@@ -34,9 +34,6 @@ const PAUSE: f64 = 15.0;
 /// How far the view turns, or by which part of the scene's size the eye moves, before a look is due.
 const TURN: f64 = 0.1;
 
-/// Half an 8-bit step.
-const BOUND: f64 = 0.5 / 255.0;
-
 /// What `planned` says of itself. It passes other options on to the actions that it plans for.
 pub fn declaration() -> Declaration {
     let text = "picks the cheapest settings of other actions that keep an error or a time";
@@ -58,6 +55,9 @@ pub fn declaration() -> Declaration {
 }
 
 impl Goals {
+    /// What is asked for where nothing is: half an 8-bit step.
+    pub const BOUND: Bound = Bound::MaxError(0.5 / 255.0);
+
     /// Reads options of `planned`; half an 8-bit step where none says anything.
     ///
     /// # Errors
@@ -75,8 +75,16 @@ impl Goals {
             (None, None) => None,
         };
         let time = number("milliseconds").map(|t| Duration::from_secs_f64((t * 1e-3).min(1e6)));
-        let bound = bound.or_else(|| time.is_none().then_some(Bound::MaxError(BOUND)));
+        let bound = bound.or_else(|| time.is_none().then_some(Self::BOUND));
         Ok(Self { bound, time })
+    }
+
+    /// Options of `planned` with these goals in place of theirs.
+    pub fn above(&self, options: &Options) -> Options {
+        let mut all = options.clone();
+        all.retain(|name, _| !["max_error", "rmse", "milliseconds"].contains(&name.as_str()));
+        all.extend(self.options());
+        all
     }
 
     /// The options that say the same.
@@ -179,11 +187,11 @@ impl PlannedAction {
         self.kept = None;
     }
 
-    /// What would be chosen for a frame of managed shapes; nothing but sparse pictures are drawn.
+    /// What would be chosen for a frame of managed shapes, and the sparse picture drawn so; nothing else is drawn.
     ///
     /// # Errors
     /// If a frame is open, a shape is not managed, or no candidate can draw.
-    pub fn plan(&mut self, desc: &FrameDesc, shapes: &[Shape]) -> Result<Plan, ActionError> {
+    pub fn plan(&mut self, desc: &FrameDesc, shapes: &[Shape]) -> Result<(Plan, Frame), ActionError> {
         self.begin_draw(desc)?;
         let noted = shapes.iter().try_for_each(|shape| self.draw(shape));
         let open = self.lifecycle.end()?;
@@ -191,7 +199,13 @@ impl PlannedAction {
         let shapes = std::mem::take(&mut self.drawn);
         let resolved: Vec<ResolvedShape> = open.drawn_shapes().cloned().collect();
         self.kept = None;
-        self.decide(desc, &shapes, &resolved)
+        let plan = self.decide(desc, &shapes, &resolved)?;
+        let Some(kept) = &self.kept else { return Err(ActionError::NotDrawing { call: "plan" }) };
+        let candidate = &self.candidates[kept.candidate];
+        let actor = &mut self.actors[candidate.actor];
+        actor.apply(&candidate.choices, plan.step)?;
+        let sparse = actor.draw(&super::search::sparse(desc, self.frames), &shapes)?;
+        Ok((plan, sparse))
     }
 
     /// Chooses for a frame: follows the last one, or looks at all candidates.
@@ -354,6 +368,7 @@ impl PlannedAction {
             rmse: look.rmse,
             seconds,
             kept: in_time && exact,
+            refining: kept.steady.k < kept.wanted,
             considered,
             ..Plan::default()
         }

@@ -7,9 +7,9 @@ use crate::{Declaration, Options, ParameterDecl, ParameterType, ParameterValue};
 pub enum Role {
     /// The distance of samples.
     Step,
-    /// How the picture is sampled or classified.
+    /// How the picture is sampled or classified: combined with each other.
     Method,
-    /// Formats, filters, precision, widths, bounds.
+    /// Formats, filters, precision, widths, bounds: varied one at a time.
     Precision,
 }
 
@@ -67,12 +67,18 @@ pub fn has_step(declaration: &Declaration, given: &Options) -> bool {
 
 /// Choices in words: `cpu classification=post`.
 pub fn words(action: &str, options: &Options) -> String {
-    let word = |value: &ParameterValue| match value {
+    options.iter().fold(action.to_owned(), |text, (name, value)| format!("{text} {name}={}", word(value)))
+}
+
+/// A value as a user writes it.
+pub fn word(value: &ParameterValue) -> String {
+    match value {
         ParameterValue::Choice(word) => word.clone(),
         ParameterValue::Bool(b) => b.to_string(),
+        ParameterValue::Int(i) => i.to_string(),
+        ParameterValue::Float(f) => f.to_string(),
         other => format!("{other:?}"),
-    };
-    options.iter().fold(action.to_owned(), |text, (name, value)| format!("{text} {name}={}", word(value)))
+    }
 }
 
 #[cfg(test)]

@@ -19,6 +19,7 @@
 
 mod action;
 mod actor;
+mod calibrate;
 pub mod errors;
 pub mod knobs;
 pub mod rates;
@@ -27,6 +28,7 @@ pub mod steps;
 
 pub use action::{PlannedAction, declaration};
 pub use actor::Actor;
+pub use calibrate::calibrate;
 pub use rates::{Rate, Rates};
 
 use std::{fmt, time::Duration};
@@ -91,6 +93,8 @@ pub struct Plan {
     pub seconds: f64,
     /// Whether goals are expected to be kept.
     pub kept: bool,
+    /// Whether the next frame is a finer one if nothing changes: both an error and a time were asked for.
+    pub refining: bool,
     /// All candidates, where they were looked at for this frame: setting, distance, error, seconds.
     pub considered: Vec<Considered>,
     /// How long planning took.

@@ -6,31 +6,10 @@
 
 use std::collections::BTreeMap;
 
-use volact_core::{Declaration, Options, ParameterDecl, ParameterType, ParameterValue};
-
-use crate::subject::word;
-
-/// What varying an option changes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Role {
-    /// The distance of samples.
-    Step,
-    /// How the picture is sampled or classified: combined with each other.
-    Method,
-    /// Formats, filters, precision, widths, bounds: varied one at a time.
-    Precision,
-}
-
-/// What an option is for, by its name; `None` where it is no axis, as threads and adapters are none.
-pub fn role(name: &str) -> Option<Role> {
-    match name {
-        "sample_distance" => Some(Role::Step),
-        "method" | "sampling" | "classification" | "pre_integration" => Some(Role::Method),
-        "format" | "texture_format" | "filter" | "blend" | "blend_precision" | "accumulation" | "target"
-        | "table_width" | "termination" => Some(Role::Precision),
-        _ => None,
-    }
-}
+use volact_core::{
+    Declaration, Options, ParameterDecl, ParameterType, ParameterValue,
+    planner::knobs::{Role, role, word},
+};
 
 /// Values of a number that has no choices of its own.
 fn numbers(name: &str) -> &'static [f64] {

@@ -11,7 +11,7 @@ use anyhow::Context as _;
 use serde_json::{Value, json};
 use volact::{
     Frame, Options, Registry, RenderAction,
-    core::{parameter::Kind, scene::Scene},
+    core::{parameter::Kind, planner::Goals, scene::Scene},
 };
 
 use super::source::{self, Opened};
@@ -65,10 +65,11 @@ struct Head {
 pub fn run(args: Args, registry: &Registry) -> anyhow::Result<ExitCode> {
     let subject = args.source.open(registry)?;
     let names = actions(&subject, &args.actions);
+    let goals = args.source.goals(&subject.scene);
     let mut runs = Vec::new();
     for name in &names {
         let options = options(&subject, name, &names, registry)?;
-        runs.push(Run::start(name, &options, &subject.scene, registry)?);
+        runs.push(Run::start(name, (&options, &goals), &subject.scene, registry)?);
     }
     for _ in 0..args.warm_up {
         runs.iter_mut().try_for_each(|run| run.draw(&subject.scene).map(drop))?;
@@ -107,7 +108,7 @@ fn options(subject: &Opened, name: &str, all: &[String], registry: &Registry) ->
     let declarations = registry.declarations();
     let takes = |action: &str, option: &str| {
         let declared = declarations.iter().filter(|d| d.kind == Kind::Action && d.name == action);
-        action == "checked" || declared.into_iter().any(|d| d.parameter(option).is_some())
+        ["checked", "planned"].contains(&action) || declared.into_iter().any(|d| d.parameter(option).is_some())
     };
     let known = |option: &str| all.iter().any(|action| takes(action, option));
     let of_command = |option: &String| subject.options.contains_key(option);
@@ -125,8 +126,13 @@ struct Run {
 }
 
 impl Run {
-    fn start(name: &str, options: &Options, subject: &Scene, registry: &Registry) -> anyhow::Result<Self> {
-        let mut action = registry.action(name, options)?;
+    fn start(
+        name: &str,
+        (options, goals): (&Options, &Goals),
+        subject: &Scene,
+        registry: &Registry,
+    ) -> anyhow::Result<Self> {
+        let mut action = registry.action_for(name, options, goals)?;
         for shape in &subject.shapes {
             action.manage(shape)?;
         }
@@ -293,6 +299,7 @@ mod tests {
                 shapes: vec![],
                 frame: FrameDesc::new(Camera::perspective(DVec3::ONE, DVec3::ZERO, DVec3::Z, 30.0), 4, 4),
                 action,
+                goals: Goals::default(),
             },
             notes: vec![],
             config: Config::default(),

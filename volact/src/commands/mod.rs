@@ -3,6 +3,7 @@
 
 pub mod bare;
 pub mod bench;
+pub mod calibrate;
 pub mod chart;
 pub mod compare;
 pub mod completions;
@@ -10,6 +11,7 @@ pub mod conform;
 pub mod cuts;
 pub mod describe;
 pub mod info;
+pub mod plan;
 pub mod plugins;
 pub mod progress;
 pub mod reference;
@@ -53,6 +55,10 @@ pub enum Command {
     Verify(verify::Args),
     /// Measure how fast a scene is drawn
     Bench(bench::Args),
+    /// Say what would be chosen for a scene to keep an error or a time, and draw nothing
+    Plan(plan::Args),
+    /// Measure how fast actions are on this machine, for the planner
+    Calibrate(calibrate::Args),
     /// Chart error against time, of every action over what its options offer
     Chart(chart::Args),
     /// Print completions for a shell
@@ -67,6 +73,9 @@ impl Command {
         let mut registry = volact::with_builtins();
         registry.set_progress(progress::watch());
         let plugins = self.load_plugins(&mut registry)?;
+        if matches!(self, Self::Render(_) | Self::Plan(_) | Self::Bench(_)) {
+            calibrate::recall(&mut registry);
+        }
         if let Self::Render(args) = &self
             && args.watch
         {
@@ -85,6 +94,8 @@ impl Command {
             Self::Conform(args) => conform::run(args, &registry),
             Self::Verify(args) => verify::run(args, &registry),
             Self::Bench(args) => bench::run(args, &registry),
+            Self::Plan(args) => plan::run(args, &registry),
+            Self::Calibrate(args) => calibrate::run(args, &registry),
             Self::Chart(args) => chart::run(args, &registry),
             Self::Completions(args) => completions::run(args, &registry),
         }
@@ -97,6 +108,7 @@ impl Command {
         let (named, scenes) = match self {
             Self::Render(args) => (args.config(), Vec::from_iter(args.scene())),
             Self::Bench(args) => (args.config(), Vec::from_iter(args.scene())),
+            Self::Plan(args) => (args.config(), Vec::from_iter(args.scene())),
             Self::Chart(args) => (args.config(), args.scenes().collect()),
             Self::Describe(_) => (None, Vec::new()),
             _ => return Ok(()),
@@ -113,6 +125,8 @@ impl Command {
         let named = match self {
             Self::Render(args) => args.config(),
             Self::Bench(args) => args.config(),
+            Self::Plan(args) => args.config(),
+            Self::Calibrate(args) => args.config(),
             Self::Conform(args) => args.config(),
             Self::Verify(args) => args.config(),
             Self::Chart(args) => args.config(),

@@ -51,9 +51,14 @@ pub fn run(args: Args, registry: &Registry) -> anyhow::Result<ExitCode> {
     let png = args.png(&output)?;
     let mut source = Source::open(&args.source, args.action.as_deref(), registry)?;
     let line = Line::new(format!("drawing with {}", source.choice.name));
-    let frame = source.draw()?;
-    drop(line);
+    let mut frame = source.draw()?;
     frame.save_with(&output, png)?;
+    // A picture in the time asked for, and finer ones until the error is kept.
+    while frame.plan.as_ref().is_some_and(|plan| plan.refining) {
+        frame = source.draw()?;
+        frame.save_with(&output, png)?;
+    }
+    drop(line);
     let report = Report { source: &source, frame: &frame, output: &output };
     report.warn();
     match args.json {

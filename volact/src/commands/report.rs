@@ -10,7 +10,11 @@ use std::{
 use serde_json::{Value, json};
 use volact::{
     Frame, ParameterValue, Shape, VolumeTexture,
-    core::{Severity, Warning, select, warning},
+    core::{
+        Method, Severity, Warning,
+        planner::{Plan, knobs::word},
+        select, warning,
+    },
 };
 
 use super::source::Source;
@@ -61,7 +65,10 @@ impl Report<'_> {
         for note in &self.source.notes {
             _ = writeln!(text, "  look    {note}");
         }
-        _ = writeln!(text, "  how     {}: {}", self.source.choice.name, self.method());
+        _ = writeln!(text, "  how     {}: {}", self.source.choice.name, method(&frame.method));
+        if let Some(chosen) = &frame.plan {
+            _ = writeln!(text, "  plan    {}", plan(chosen));
+        }
         // That a backend, or its device, is not there at all is no news, unless the user wants all of them.
         let told = |why: &str| !select::is_absent(why) || log::log_enabled!(log::Level::Info);
         for (name, why) in self.source.choice.refused.iter().filter(|(_, why)| told(why)) {
@@ -72,21 +79,6 @@ impl Report<'_> {
             _ = writeln!(text, "          {name}: {value}");
         }
         text
-    }
-
-    fn method(&self) -> String {
-        let method = &self.frame.method;
-        let mut parts: Vec<String> = Vec::new();
-        let mut part = |text: String, there: bool| parts.extend(there.then_some(text));
-        part(method.sampling.clone(), !method.sampling.is_empty());
-        part(format!("every {:.4}", method.sample_distance), method.sample_distance > 0.0);
-        part(method.classification.clone(), !method.classification.is_empty());
-        part(format!("table of {}", method.table_width), method.table_width > 0);
-        part(format!("voxels {}", method.texture_format), !method.texture_format.is_empty());
-        part(format!("filter {}", method.filter), !method.filter.is_empty());
-        part(format!("blend {}", method.blend), !method.blend.is_empty());
-        part(method.device.clone(), !method.device.is_empty());
-        if parts.is_empty() { "nothing to tell".into() } else { parts.join(", ") }
     }
 
     fn speed(&self) -> String {
@@ -106,7 +98,7 @@ impl Report<'_> {
     /// The summary for programs.
     pub fn to_json(&self) -> Value {
         let (frame, choice) = (self.frame, &self.source.choice);
-        let (m, s) = (&frame.method, &frame.statistics);
+        let s = &frame.statistics;
         let warning = |w: &Warning| json!({"code": w.code.as_str(), "subject": w.subject, "message": w.message});
         json!({
             "output": self.output.display().to_string(),
@@ -116,11 +108,8 @@ impl Report<'_> {
             "look": self.source.notes,
             "action": choice.name,
             "refused": choice.refused.iter().map(|(n, why)| json!({"action": n, "why": why})).collect::<Vec<_>>(),
-            "method": {
-                "sampling": m.sampling, "sample_distance": m.sample_distance, "classification": m.classification,
-                "table_width": m.table_width, "texture_format": m.texture_format, "filter": m.filter,
-                "blend": m.blend, "termination": m.termination, "device": m.device,
-            },
+            "method": method_json(&frame.method),
+            "plan": frame.plan.as_ref().map(plan_json),
             "statistics": {
                 "total_ms": milliseconds(s.total), "prepare_ms": milliseconds(s.prepare),
                 "render_ms": milliseconds(s.render), "rays": s.rays, "samples": s.samples, "skipped": s.skipped,
@@ -131,6 +120,58 @@ impl Report<'_> {
             "warnings": frame.warnings.iter().map(warning).collect::<Vec<_>>(),
         })
     }
+}
+
+/// How a frame is drawn, in words.
+pub fn method(method: &Method) -> String {
+    let mut parts: Vec<String> = Vec::new();
+    let mut part = |text: String, there: bool| parts.extend(there.then_some(text));
+    part(method.sampling.clone(), !method.sampling.is_empty());
+    part(format!("every {:.4}", method.sample_distance), method.sample_distance > 0.0);
+    part(method.classification.clone(), !method.classification.is_empty());
+    part(format!("table of {}", method.table_width), method.table_width > 0);
+    part(format!("voxels {}", method.texture_format), !method.texture_format.is_empty());
+    part(format!("filter {}", method.filter), !method.filter.is_empty());
+    part(format!("blend {}", method.blend), !method.blend.is_empty());
+    part(method.device.clone(), !method.device.is_empty());
+    if parts.is_empty() { "nothing to tell".into() } else { parts.join(", ") }
+}
+
+/// How a frame is drawn, for programs.
+pub fn method_json(m: &Method) -> Value {
+    json!({
+        "sampling": m.sampling, "sample_distance": m.sample_distance, "classification": m.classification,
+        "table_width": m.table_width, "texture_format": m.texture_format, "filter": m.filter,
+        "blend": m.blend, "termination": m.termination, "device": m.device,
+    })
+}
+
+/// What was chosen, in words.
+pub fn plan(plan: &Plan) -> String {
+    let of = |seconds| time(Duration::try_from_secs_f64(seconds).unwrap_or_default());
+    let mut text = format!(
+        "{}; expects errors of {:.1e} (max) and {:.1e} (rmse) in {}; planned in {} by {} pixels",
+        plan.setting,
+        plan.max_error,
+        plan.rmse,
+        of(plan.seconds),
+        time(plan.planning),
+        plan.sparse
+    );
+    if !plan.kept {
+        text += "; what was asked for is NOT expected to be kept";
+    }
+    text
+}
+
+/// What was chosen, for programs.
+pub fn plan_json(plan: &Plan) -> Value {
+    json!({
+        "action": plan.action, "setting": plan.setting, "step": plan.step,
+        "options": plan.options.iter().map(|(k, v)| (k.clone(), json!(word(v)))).collect::<serde_json::Map<_, _>>(),
+        "max_error": plan.max_error, "rmse": plan.rmse, "expected_ms": 1e3 * plan.seconds, "kept": plan.kept,
+        "refining": plan.refining, "planning_ms": milliseconds(plan.planning), "sparse_pixels": plan.sparse,
+    })
 }
 
 fn texture(shape: &Shape) -> Option<VolumeTexture> {

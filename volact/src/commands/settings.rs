@@ -128,10 +128,18 @@ fn from_env() -> Option<PathBuf> {
 }
 
 fn user_config() -> Option<PathBuf> {
+    Some(user_folder("XDG_CONFIG_HOME", "APPDATA", ".config")?.join("volact").join("config.ron"))
+}
+
+/// The user's folder for what can be made again, if there is one.
+pub fn cache() -> Option<PathBuf> {
+    Some(user_folder("XDG_CACHE_HOME", "LOCALAPPDATA", ".cache")?.join("volact"))
+}
+
+/// A folder of the user's by its variable here, its variable on Windows, or its name in the home folder.
+fn user_folder(here: &str, windows: &str, name: &str) -> Option<PathBuf> {
     let folder = |name: &str| env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
-    let base =
-        folder("XDG_CONFIG_HOME").or_else(|| folder("APPDATA")).or_else(|| Some(folder("HOME")?.join(".config")));
-    Some(base?.join("volact").join("config.ron"))
+    folder(here).or_else(|| folder(windows)).or_else(|| Some(folder("HOME")?.join(name)))
 }
 
 /// Splits `shape.parameter` into both, where there is a shape of that name.

@@ -1,7 +1,7 @@
 //! A scene of a chart: its settings, its truth, and what was measured of it.
 
 use std::{
-    path::{Path, PathBuf},
+    path::Path,
     time::{Duration, Instant},
 };
 
@@ -25,7 +25,7 @@ use volact_conformance::{
 };
 
 use super::{
-    super::{progress::Line, source::Opened},
+    super::{progress::Line, settings, source::Opened},
     Args,
 };
 
@@ -60,7 +60,7 @@ impl Subject {
             bail!("{}: no action draws it: {}", input.display(), why.join("; "));
         }
         let _line = Line::new(format!("{name}: the reference"));
-        let folder = args.cache.clone().or_else(cache);
+        let folder = args.cache.clone().or_else(|| Some(settings::cache()?.join("truth")));
         let truth = truth::truth(registry, &scene.shapes, &scene.desc, folder.as_deref());
         let truth = truth.map_err(anyhow::Error::msg).with_context(|| format!("{}: has no truth", input.display()))?;
         log::info!("{name}: the true picture {}", if truth.kept { "was kept" } else { "was made" });
@@ -178,12 +178,4 @@ fn cannot(
     let able = resolved.map_err(|e| chain(&e)).and_then(|shapes| can_draw(&action.caps(), &shapes));
     let able = able.and_then(|()| scene.shapes.iter().try_for_each(|s| action.manage(s)).map_err(|e| chain(&e)));
     able.err()
-}
-
-/// Where true pictures are kept, if there is such a place.
-fn cache() -> Option<PathBuf> {
-    let folder = |name: &str| std::env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
-    let base =
-        folder("XDG_CACHE_HOME").or_else(|| folder("LOCALAPPDATA")).or_else(|| Some(folder("HOME")?.join(".cache")))?;
-    Some(base.join("volact").join("truth"))
 }

@@ -22,7 +22,7 @@ use volact::{Frame, FrameExt as _, Registry};
 use super::{
     print_error,
     render::Args,
-    report::{Report, time},
+    report::{self, Report, time},
 };
 use events::Events;
 use files::Snapshot;
@@ -45,6 +45,7 @@ pub fn run(args: &Args, registry: &Registry) -> anyhow::Result<ExitCode> {
     let mut events = Events::new();
     let mut roots = session.roots();
     let mut seen = Snapshot::default();
+    let mut refining = false;
     loop {
         let start = Instant::now();
         let changed = Snapshot::take(&roots, &output) != seen;
@@ -64,16 +65,50 @@ pub fn run(args: &Args, registry: &Registry) -> anyhow::Result<ExitCode> {
                 frame.save_with(&output, png)?;
                 Ok(frame)
             }) {
-                Ok(frame) => tell(&session, &frame, &output, (&changed, start.elapsed(), first(&seen)))?,
-                Err(error) => complain(&error, session.drawn()),
+                Ok(frame) => {
+                    tell(&session, &frame, &output, (&changed, start.elapsed(), first(&seen)))?;
+                    refining = is_refining(&frame);
+                }
+                Err(error) => {
+                    complain(&error, session.drawn());
+                    refining = false;
+                }
             }
             if first(&seen) {
                 say(&format!("watching {}; Ctrl-C ends", now.summary()));
             }
             seen = now;
+        } else if refining {
+            refining = refine(&mut session, |frame| Ok(frame.save_with(&output, png)?))?;
+        }
+        if refining {
+            continue;
         }
         // Where the system tells of nothing (network folders), looking from time to time does.
         events.wait(Duration::from_secs(1).max(20 * looking));
+    }
+}
+
+/// Whether a finer picture follows if nothing changes.
+fn is_refining(frame: &Frame) -> bool {
+    frame.plan.as_ref().is_some_and(|plan| plan.refining)
+}
+
+/// Draws and keeps the next finer picture; whether another one follows.
+fn refine(session: &mut Session, save: impl Fn(&Frame) -> anyhow::Result<()>) -> anyhow::Result<bool> {
+    let drawn = session.refine().and_then(|frame| frame.as_ref().map(&save).transpose().map(|_| frame));
+    match drawn {
+        Ok(Some(frame)) => {
+            if !is_refining(&frame) {
+                frame.plan.iter().for_each(|plan| say(&format!("refined: {}", report::plan(plan))));
+            }
+            Ok(is_refining(&frame))
+        }
+        Ok(None) => Ok(false),
+        Err(error) => {
+            complain(&error, session.drawn());
+            Ok(false)
+        }
     }
 }
 

@@ -16,7 +16,7 @@ use anyhow::Context as _;
 use volact::{
     Frame, Geometry, Options, ParameterValue, Registry, ShaderEntry, Shape, Sliced,
     config::Config,
-    core::{parameter::ParameterMap, scene::KeptData, select},
+    core::{parameter::ParameterMap, planner::Goals, scene::KeptData, select},
 };
 
 use super::{super::settings, files::Root};
@@ -33,6 +33,7 @@ struct Chosen {
     config: Config,
     name: Option<String>,
     options: Options,
+    goals: Goals,
     /// The shader of each shape, as it was registered.
     shaders: Vec<Option<Arc<ShaderEntry>>>,
 }
@@ -117,11 +118,12 @@ impl<'a> Session<'a> {
         let registry = self.registry()?;
         let opened = self.args.source.open_keeping(&registry, &mut self.kept)?;
         let (name, options) = opened.action(self.args.action.as_deref());
+        let goals = self.args.source.goals(&opened.scene);
         let Opened { scene, notes, config, .. } = opened;
         let catalog = registry.shaders();
         let shaders = scene.shapes.iter().map(|shape| catalog.get(&shape.state().shader).cloned()).collect();
         self.warn_of_plugins(&config);
-        let chosen = Chosen { config, name, options, shaders };
+        let chosen = Chosen { config, name, options, goals, shaders };
         if let Some((mut source, _)) = self.drawn.take().filter(|(_, before)| *before == chosen) {
             (source.frame, source.notes) = (scene.frame.clone(), notes.clone());
             let _line = Line::new(format!("drawing with {}", source.choice.name));
@@ -134,13 +136,21 @@ impl<'a> Session<'a> {
             }
         }
         let Chosen { config, name, options, .. } = &chosen;
-        let choice = select::select(&registry, config, name.as_deref(), options, &scene.shapes)?;
+        let choice = select::select_for(&registry, config, name.as_deref(), options, (&chosen.goals, &scene.shapes))?;
         let mut source = Source { shapes: scene.shapes, frame: scene.frame, choice, notes };
         let line = Line::new(format!("drawing with {}", source.choice.name));
         let frame = source.draw()?;
         drop(line);
         (self.drawn, self.picture) = (Some((source, chosen)), true);
         Ok(frame)
+    }
+
+    /// The next finer picture of what has not changed.
+    ///
+    /// # Errors
+    /// If it cannot be drawn.
+    pub fn refine(&mut self) -> anyhow::Result<Option<Frame>> {
+        self.drawn.as_mut().map(|(source, _)| source.draw()).transpose()
     }
 
     /// With the shaders of all folders, as they are now.
