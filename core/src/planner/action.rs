@@ -9,7 +9,7 @@ use super::{
     Actor, Bound, Considered, Goals, Plan, Rates,
     errors::Tail,
     knobs,
-    search::{Candidate, Fitted, Look, Search, considered},
+    search::{Candidate, Density, Fitted, Look, Search, considered, sparse},
     steps::{self, Steady},
 };
 use crate::{
@@ -29,7 +29,7 @@ const FRAMES: u32 = 16;
 const SHARE: f64 = 0.02;
 
 /// Frames between two looks at most.
-const PAUSE: f64 = 15.0;
+const PAUSE: f64 = 60.0;
 
 /// How far the view turns, or by which part of the scene's size the eye moves, before a look is due.
 const TURN: f64 = 0.1;
@@ -201,10 +201,11 @@ impl PlannedAction {
         self.kept = None;
         let plan = self.decide(desc, &shapes, &resolved)?;
         let Some(kept) = &self.kept else { return Err(ActionError::NotDrawing { call: "plan" }) };
+        let few = sparse(desc, self.frames, Density::first(self.goals.bound));
         let candidate = &self.candidates[kept.candidate];
         let actor = &mut self.actors[candidate.actor];
         actor.apply(&candidate.choices, plan.step)?;
-        let sparse = actor.draw(&super::search::sparse(desc, self.frames), &shapes)?;
+        let sparse = actor.draw(&few, &shapes)?;
         Ok((plan, sparse))
     }
 
@@ -228,10 +229,6 @@ impl PlannedAction {
         let planning = started.elapsed();
         let mut plan = self.told(&kept, &look, voxel(resolved), considered);
         plan.planning = planning;
-        plan.sparse = {
-            let s = super::search::sparse(desc, self.frames);
-            s.width * s.height
-        };
         self.kept = Some(kept);
         Ok(plan)
     }
@@ -247,7 +244,13 @@ impl PlannedAction {
         let voxel = voxel(resolved);
         self.tail = Tail::default();
         let truth = self.truth.as_mut().filter(|t| t.refusal(shapes).is_none());
-        let mut search = Search::new((&mut self.actors, truth), shapes, (desc, self.frames), voxel, &mut self.tail);
+        let mut search = Search::new(
+            (&mut self.actors, truth),
+            shapes,
+            (desc, self.frames, Density::first(self.goals.bound)),
+            voxel,
+            &mut self.tail,
+        );
         let (mut all, mut fitted, mut refusal) = (Vec::new(), Vec::new(), None);
         for (number, candidate) in self.candidates.iter().enumerate() {
             if let Some(why) = search.actors[candidate.actor].refusal(shapes) {
@@ -303,7 +306,7 @@ impl PlannedAction {
         let started = Instant::now();
         let candidate = self.candidates[kept.candidate].clone();
         let truth = self.truth.as_mut().filter(|t| t.refusal(shapes).is_none());
-        let of = (desc, self.frames);
+        let of = (desc, self.frames, Density::Few);
         let mut search = Search::new((&mut self.actors, truth), shapes, of, voxel(resolved), &mut self.tail);
         let look = search.look(&candidate, kept.wanted, kept.order)?;
         kept.steady.k = kept.wanted;
@@ -369,6 +372,7 @@ impl PlannedAction {
             seconds,
             kept: in_time && exact,
             refining: kept.steady.k < kept.wanted,
+            sparse: look.pixels,
             considered,
             ..Plan::default()
         }
@@ -430,6 +434,7 @@ impl PlannedAction {
             rmse: plan.rmse,
             samples: frame.statistics.samples as f64,
             sparse: (0.0, 1.0),
+            pixels: plan.sparse,
         };
         let Some(kept) = self.kept.take() else { return Ok(None) };
         let look = self.at(kept.steady.k, &look, kept.order);

@@ -9,11 +9,29 @@ use super::{
 };
 use crate::{ActionError, FrameDesc, Opaque, OpaqueDepth, Options, Pixels, Shape, Viewport};
 
-/// One of this many pixels is in the sparse picture.
-const SPARSE: usize = 400;
+/// Which of the pixels are in a sparse picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Density {
+    /// One of 400, from 256 to 4096: the mean square shows in them, and with those of earlier frames the largest.
+    Few,
+    /// One of 100, from 1024 to 16,384: the largest shows.
+    Many,
+}
 
-/// The fewest and the most pixels of a sparse picture.
-const PIXELS: [usize; 2] = [256, 4096];
+impl Density {
+    /// For the first look at a scene.
+    pub fn first(bound: Option<Bound>) -> Self {
+        if matches!(bound, Some(Bound::MaxError(_))) { Self::Many } else { Self::Few }
+    }
+
+    /// One of so many pixels, at least and at most so many.
+    fn pixels(self) -> (usize, [usize; 2]) {
+        match self {
+            Self::Few => (400, [256, 4096]),
+            Self::Many => (100, [1024, 16_384]),
+        }
+    }
+}
 
 /// The picture that errors are taken from is this many numbers of the lattice finer: a quarter of the distance.
 const FINER: i32 = 8;
@@ -22,7 +40,7 @@ const FINER: i32 = 8;
 const LOOKS: usize = 4;
 
 /// What an estimate of a bound is multiplied by: for the largest error, and the mean square.
-const SAFETY: [f64; 2] = [1.7, 1.15];
+const SAFETY: [f64; 2] = [2.2, 1.2];
 
 /// One way to draw.
 #[derive(Clone, Debug)]
@@ -48,6 +66,8 @@ pub struct Look {
     pub samples: f64,
     /// Seconds of the sparse picture itself, and its samples.
     pub sparse: (f64, f64),
+    /// Its pixels.
+    pub pixels: usize,
 }
 
 impl Look {
@@ -104,13 +124,23 @@ impl<'a> Search<'a> {
     pub fn new(
         (actors, truth): (&'a mut [Actor], Option<&'a mut Actor>),
         shapes: &'a [Shape],
-        (desc, turn): (&FrameDesc, usize),
+        (desc, turn, density): (&FrameDesc, usize, Density),
         voxel: f64,
         tail: &'a mut Tail,
     ) -> Self {
         let viewport = desc.viewport();
         let pixels = viewport.width * viewport.height;
-        Self { actors, truth, shapes, sparse: sparse(desc, turn), pixels, voxel, tail, samples: None, finest: None }
+        Self {
+            actors,
+            truth,
+            shapes,
+            sparse: sparse(desc, turn, density),
+            pixels,
+            voxel,
+            tail,
+            samples: None,
+            finest: None,
+        }
     }
 
     /// Draws a candidate at a step, and compares it with what is much finer.
@@ -128,14 +158,15 @@ impl<'a> Search<'a> {
         errors.rmse *= own;
         errors.worst.iter_mut().for_each(|e| *e *= own);
         self.tail.add(&errors);
-        let looked_at = (self.sparse.width * self.sparse.height) as f64;
+        let pixels = self.sparse.width * self.sparse.height;
         let samples = frame.statistics.samples as f64;
         Ok(Look {
             k,
             max: self.tail.largest(&errors, self.pixels),
             rmse: errors.rmse,
-            samples: samples * self.pixels as f64 / looked_at,
+            samples: samples * self.pixels as f64 / pixels as f64,
             sparse: (seconds, samples),
+            pixels,
         })
     }
 
@@ -242,10 +273,11 @@ pub fn considered(
 }
 
 /// The view with few pixels, one more or less from turn to turn, so that in time all places are seen.
-pub fn sparse(desc: &FrameDesc, turn: usize) -> FrameDesc {
+pub fn sparse(desc: &FrameDesc, turn: usize, density: Density) -> FrameDesc {
+    let (one_of, [fewest, most]) = density.pixels();
     let whole = desc.viewport();
     let pixels = whole.width * whole.height;
-    let wanted = (pixels / SPARSE).clamp(PIXELS[0], PIXELS[1]).min(pixels);
+    let wanted = (pixels / one_of).clamp(fewest, most).min(pixels);
     let width = (wanted as f64 * whole.width as f64 / whole.height as f64).sqrt();
     let width = (width.round() as usize + [0, 1, 3, 2][turn % 4]).clamp(1, whole.width);
     let height = (width as f64 * whole.height as f64 / whole.width as f64).round() as usize;
@@ -284,7 +316,7 @@ mod tests {
         let camera = Camera::fit(&Aabb::new(DVec3::ZERO, DVec3::ONE), View::Front, 8, 8);
         for (width, height) in [(512, 512), (1920, 1080), (1, 8192), (8192, 1), (1, 1), (16, 9), (40, 3000)] {
             for turn in 0..4 {
-                let few = sparse(&FrameDesc::new(camera, width, height), turn);
+                let few = sparse(&FrameDesc::new(camera, width, height), turn, Density::Few);
                 assert!((1..=width).contains(&few.width) && (1..=height).contains(&few.height));
                 let pixels = few.width * few.height;
                 assert!(pixels <= 8192 && pixels >= (width * height / 400).clamp(1, 200), "{width} {height}: {pixels}");
@@ -297,7 +329,7 @@ mod tests {
         let camera = Camera::fit(&Aabb::new(DVec3::ZERO, DVec3::ONE), View::Front, 8, 8);
         let depth: Arc<[f32]> = (0..100 * 60).map(|i| if i % 100 < 50 { 1.0 } else { f32::INFINITY }).collect();
         let opaque = Opaque { color: None, depth: OpaqueDepth::Distance(depth) };
-        let few = sparse(&FrameDesc::new(camera, 100, 60).with_opaque(opaque), 0);
+        let few = sparse(&FrameDesc::new(camera, 100, 60).with_opaque(opaque), 0, Density::Few);
         let Some(Opaque { depth: OpaqueDepth::Distance(found), .. }) = few.opaque else { panic!() };
         assert_eq!(found.len(), few.width * few.height);
         for (i, d) in found.iter().enumerate() {

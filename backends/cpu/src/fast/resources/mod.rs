@@ -7,7 +7,7 @@ mod tables;
 
 use std::{
     collections::{BTreeMap, btree_map::Entry},
-    sync::Arc,
+    sync::{Arc, Mutex, PoisonError, Weak},
 };
 
 use volact_core::{
@@ -65,6 +65,9 @@ pub struct Resources {
     /// By shape.
     vacant: BTreeMap<u64, Vacant>,
 }
+
+/// Bounds that some action of this process has.
+static MADE: Mutex<BTreeMap<BoundsKey, Weak<ValueBounds>>> = Mutex::new(BTreeMap::new());
 
 /// The share of empty blocks from which on they are looked at by programs.
 const WORTH: f64 = 0.05;
@@ -391,12 +394,7 @@ impl Resources {
         }
         let bounds = match self.bounds.get(&key.bounds) {
             Some(bounds) => Arc::clone(bounds),
-            None => {
-                let bounds = Arc::new(ValueBounds::new(&voxels, settings.threads));
-                say("value bounds", bounds.bytes());
-                self.bounds.insert(key.bounds, Arc::clone(&bounds));
-                bounds
-            }
+            None => self.make_bounds(key.bounds, &voxels, settings, say),
         };
         let empty = bounds.emptiness(tables::opaque(&table.resolve(texture.range()), units));
         // Looking where to skip costs more than a few samples.
@@ -405,6 +403,26 @@ impl Resources {
             say("occupancy", empty.bytes());
         }
         self.vacant.insert(shape.id, Vacant { key, empty });
+    }
+
+    /// Bounds of values, those of another action of this process if it has them.
+    fn make_bounds(
+        &mut self,
+        key: BoundsKey,
+        voxels: &Voxels<'_>,
+        settings: &Settings,
+        say: &mut impl FnMut(&str, usize),
+    ) -> Arc<ValueBounds> {
+        let mut made = MADE.lock().unwrap_or_else(PoisonError::into_inner);
+        made.retain(|_, bounds| bounds.strong_count() > 0);
+        let bounds = made.get(&key).and_then(Weak::upgrade).unwrap_or_else(|| {
+            let bounds = Arc::new(ValueBounds::new(voxels, settings.threads));
+            say("value bounds", bounds.bytes());
+            made.insert(key, Arc::downgrade(&bounds));
+            bounds
+        });
+        self.bounds.insert(key, Arc::clone(&bounds));
+        bounds
     }
 
     fn prepare_volume(
@@ -422,12 +440,7 @@ impl Resources {
         let skips = settings.skipping && may_skip(shape, texture) && !(voxels.scalar.is_float() && sums);
         let bounds = match self.bounds.get(&key) {
             Some(bounds) => Some(Arc::clone(bounds)),
-            None if skips => {
-                let bounds = Arc::new(ValueBounds::new(&voxels, settings.threads));
-                say("value bounds", bounds.bytes());
-                self.bounds.insert(key, Arc::clone(&bounds));
-                Some(bounds)
-            }
+            None if skips => Some(self.make_bounds(key, &voxels, settings, say)),
             None => None,
         };
         if compositing == Compositing::Over {
