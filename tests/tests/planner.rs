@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use volact_conformance::{
     metrics::{max_error, rms_error, wide},
-    rig::{draw_managed, registry, truth},
+    rig::{self, draw_managed},
     scene::{colors, lut, shaded, volume},
 };
 use volact_core::{
@@ -16,6 +16,16 @@ use volact_core::{
 };
 
 const SIZE: [usize; 2] = [56, 48];
+
+/// With the shaders that ship, too.
+fn registry() -> Registry {
+    let mut registry = rig::registry();
+    for entry in volact_shaders::builtin().unwrap() {
+        // Those that need no source are known already.
+        _ = registry.add_shader(entry);
+    }
+    registry
+}
 
 /// Three waves through a cube of 24 samples, each with another table: a ramp, a fog, peaks of two widths.
 fn scenes() -> Vec<(&'static str, Shape)> {
@@ -73,8 +83,10 @@ fn plan(frame: &Frame) -> &Plan {
 
 /// Errors of a frame against the certified picture: the largest, and the root of the mean square.
 fn errors(frame: &Frame, shape: &Shape, desc: &FrameDesc) -> [f64; 2] {
-    let wanted = truth(std::slice::from_ref(shape), desc);
-    [max_error(&wide(frame), &wanted.color), rms_error(&wide(frame), &wanted.color)]
+    let mut reference = registry().action("reference", &Options::new()).unwrap();
+    reference.manage(shape).unwrap();
+    let wanted = wide(&draw(reference.as_mut(), shape, desc));
+    [max_error(&wide(frame), &wanted), rms_error(&wide(frame), &wanted)]
 }
 
 #[test]
@@ -158,7 +170,7 @@ fn a_time_takes_the_finest_step_within_it() {
 #[test]
 fn with_both_goals_pictures_are_refined_until_the_error_is_kept_or_something_moves() {
     let (_, shape) = scenes().remove(0);
-    let goals = [("max_error", (1.0 / 255.0).into()), ("milliseconds", 4.0.into())];
+    let goals = [("max_error", (1.0 / 255.0).into()), ("milliseconds", 12.0.into())];
     let mut action = try_planned(&timed(), &goals, &shape).unwrap();
     let mut frames = vec![draw(action.as_mut(), &shape, &seen(35.0))];
     while plan(&frames[frames.len() - 1]).refining {
@@ -169,7 +181,7 @@ fn with_both_goals_pictures_are_refined_until_the_error_is_kept_or_something_mov
     assert!(steps.len() > 2 && steps.windows(2).all(|s| s[1] < s[0]), "{steps:?}");
     let errors: Vec<f64> = frames.iter().map(|f| errors(f, &shape, &seen(35.0))[0]).collect();
     assert!(errors[0] > 1.0 / 255.0 && errors[errors.len() - 1] <= 1.0 / 255.0, "{errors:?}");
-    assert!(frames[0].statistics.samples as f64 * 1e-6 < 5e-3, "the first one within the time");
+    assert!(frames[0].statistics.samples as f64 * 1e-6 < 13e-3, "the first one within the time");
     // What is good enough stays as it is.
     let again = draw(action.as_mut(), &shape, &seen(35.0));
     assert_eq!(again.color, frames[frames.len() - 1].color);

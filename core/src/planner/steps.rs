@@ -6,8 +6,11 @@ pub const COARSEST: i32 = -12;
 /// The finest: a 64th of a voxel.
 pub const FINEST: i32 = 24;
 
-/// Frames in a row that must allow a coarser step before it is taken.
-const CALM: u32 = 3;
+/// Looks in a row that must allow a coarser step before it is taken.
+const CALM: u32 = 6;
+
+/// A coarser step is taken only where its error is expected to be within this part of the bound.
+const ROOM: f64 = 0.8;
 
 /// A number of the lattice as a distance, 0 being the smallest voxel.
 pub fn distance(voxel: f64, k: i32) -> f64 {
@@ -51,12 +54,12 @@ impl Steady {
     }
 
     /// Goes on with the error that is expected at the step, and its order: finer at once where the bound asks
-    /// for it, coarser by one where three frames in a row allowed for it with room to spare.
+    /// for it, coarser by one where six looks in a row allowed for it with room to spare.
     pub fn follow(&mut self, error: f64, p: f64, bound: f64) {
         let wanted = reaching(self.k, error, p, bound);
         if wanted > self.k {
             *self = Self::new(wanted);
-        } else if reaching(self.k, error, p, 0.9 * bound) < self.k {
+        } else if reaching(self.k, error, p, ROOM * bound) < self.k {
             self.calm += 1;
             if self.calm >= CALM {
                 *self = Self::new(self.k - 1);
@@ -67,7 +70,7 @@ impl Steady {
     }
 
     /// Goes on with the time that is expected at the step: coarser at once where that is too long, finer by one
-    /// where three frames in a row left room for it. Half the distance takes twice the time at most.
+    /// where six looks in a row left room for it. Half the distance takes twice the time at most.
     pub fn follow_time(&mut self, seconds: f64, wanted: f64) {
         let finer = (0.25_f64).exp2();
         if seconds > wanted {
@@ -117,7 +120,7 @@ mod tests {
         let mut steady = Steady::new(8);
         steady.follow_time(seconds(8), 0.02);
         assert!(seconds(steady.k) <= 0.02 && seconds(steady.k + 1) > 0.02);
-        for _ in 0..30 {
+        for _ in 0..60 {
             steady.follow_time(seconds(steady.k), 0.08);
         }
         assert!(seconds(steady.k) <= 0.08 && seconds(steady.k) > 0.05);
@@ -137,7 +140,7 @@ mod tests {
         }
         assert!(changes <= 2, "{changes}");
         // A lasting change is followed.
-        for _ in 0..60 {
+        for _ in 0..100 {
             steady.follow(0.01 * distance(1.0, steady.k).powi(2), 2.0, 1.0);
         }
         assert!(steady.k <= -11, "{}", steady.k);
