@@ -152,6 +152,11 @@ fn all_sources_are_right_and_small() {
         Kernel::<f64>::new(&program, Entry::Shade, &uniforms(&map)).unwrap();
         let text = &entry.source.as_ref().unwrap().text;
         assert!(text.starts_with(&format!("// {name}: ")), "{name} has a header");
+        // What is computed has a source, with its year; `tangent_space` follows a product.
+        let header: String = text.lines().take_while(|line| line.starts_with("//")).collect();
+        let year = |word: &str| word.len() == 4 && (word.starts_with("19") || word.starts_with("20"));
+        let cited = header.split(|c: char| !c.is_ascii_digit()).any(year);
+        assert!(cited || header.contains("OpenGL Volumizer"), "{name} cites no source");
     }
 }
 
