@@ -82,7 +82,7 @@ fn refused(registry: &Registry) -> String {
     let mut text = String::new();
     for (name, refused) in registry.shaders().all_refused() {
         let gap = if text.is_empty() { "\nrefused\n" } else { "" };
-        _ = writeln!(text, "{gap}  shader {name}: {}", refused.why.replace('\n', "\n    "));
+        _ = writeln!(text, "{gap}  shader {name}: {}", super::plugins::indented(&refused.why));
     }
     text
 }
