@@ -133,9 +133,10 @@ pub fn built_in(word: &str) -> bool {
 fn declared(text: &str, tokens: &[Token], i: usize) -> Option<bool> {
     let global = tokens[i].depth == 0;
     let mut at = i.checked_sub(1)?;
-    // Past the address space of `var<…>`.
+    // Past the address space of `var<…>`; other `>` end arrows, types and comparisons.
     if tokens[at].is('>') {
-        at = tokens[..at].iter().rposition(|t| t.is('<'))?.checked_sub(1)?;
+        let open = tokens[..at].iter().rposition(|t| t.kind != Kind::Word && !t.is(','))?;
+        at = open.checked_sub(1).filter(|_| tokens[open].is('<'))?;
         return (&text[tokens[at].range.clone()] == "var").then_some(global);
     }
     match &text[tokens[at].range.clone()] {

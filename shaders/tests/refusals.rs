@@ -135,6 +135,12 @@ fn names_that_would_hide_others_are_refused() {
         assert!(error.contains(wanted), "{text}\n{error}");
         assert!(error.starts_with("test.wgsl:2:"), "{error}");
     }
+    // Arrows and comparisons after a `var<…>` declare nothing.
+    let text = format!(
+        "fn f(p: vec3<f32>) -> f32 {{ var<function> x = 1.0; if x > volume(p) {{ x = 2.0; }} return x; }} {SHADE}"
+    );
+    Program::new(&entry(&text, Compositing::Over, parameters())).unwrap();
+    assert_eq!(refused(&format!("var<private> x: f32; {SHADE}")).matches("test.wgsl:").count(), 1);
     // Inside a function built-ins may be hidden, as WGSL has it, and members have names of their own.
     let text = format!(
         "{SHADE}struct S {{ volume: f32, exp: f32 }} fn f(x: S) -> f32 {{ let step = x.volume; return step; }}"
