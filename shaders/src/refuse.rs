@@ -226,6 +226,11 @@ pub fn functions(text: &str) -> Vec<(&str, std::ops::Range<usize>)> {
     declared.map(|w| (&text[w[1].range.clone()], w[1].range.clone())).collect()
 }
 
+/// Whether a text declares a function of that name, or of one so near that it may be meant.
+pub fn has_function_like(text: &str, name: &str) -> bool {
+    nearest(name, functions(text).iter().map(|(own, _)| *own)).is_some()
+}
+
 /// The error of a function that must be there and is not.
 pub fn missing(text: &str, function: &str, signature: &str) -> SourceError {
     let functions = functions(text);

@@ -371,6 +371,15 @@ fn built_in_shaders_are_recognised_by_what_they_do() {
         assert_eq!(of(&entry), wanted, "{}", entry.declaration.name);
         assert_eq!(recognise(&Program::new(&entry).unwrap(), false), None);
     }
+    // What the compositing takes is that of the volume, whether it is written or not.
+    for name in ["mip", "minip", "average", "xray"] {
+        let mut entry = shipped(name);
+        let mut text = (*entry.source.unwrap()).clone();
+        text.text = text.text.replace("fn value(s: Sample) -> f32 { return volume(s.position); }", "");
+        assert!(!text.text.contains("fn value"));
+        entry.source = Some(text.into());
+        assert_eq!(of(&entry).map(Native::name), Some(name));
+    }
     let with = |text: &str| {
         let mut entry = shipped("lut");
         entry.declaration.name = "mine".into();

@@ -4,7 +4,7 @@ mod common;
 
 use common::{entry, refused, required};
 use volact_core::{Compositing, ParameterDecl, ParameterType};
-use volact_shaders::{Program, ShaderError, load, load_folder};
+use volact_shaders::{Entry, Program, ShaderError, load, load_folder};
 
 const SHADE: &str = "fn shade(s: Sample) -> Medium { return Medium(); }\n";
 
@@ -48,6 +48,12 @@ fn compositing_of_values_wants_a_value() {
     let error = flat(SHADE);
     assert!(error.contains("no function `value`, wanted `fn value(s: Sample) -> f32`"), "{error}");
     assert!(error.contains("compositing `maximum` is of this value"), "{error}");
+    // A volume's value stands in for it, but not where a name is nearly that.
+    let with_volume =
+        |text: &str| Program::new(&entry(text, Compositing::Maximum, vec![required("volume", ParameterType::Volume)]));
+    assert!(with_volume(SHADE).unwrap().has(Entry::Value));
+    let error = with_volume(&format!("{SHADE}fn valu(s: Sample) -> f32 {{ return 1.0; }}")).unwrap_err().to_string();
+    assert!(error.contains("; is it `valu`?"), "{error}");
     let both = format!(
         "{SHADE}fn value(s: Sample) -> f32 {{ return 1.0; }}
         fn shade_segment(front: Sample, back: Sample) -> Medium {{ return Medium(); }}"
