@@ -73,6 +73,36 @@ fn broken_tables_are_refused_with_one_clear_error() {
     assert!(refusal(folder.path(), 29).message.contains("an aligned one"));
 }
 
+/// Tables in which all is there but one function, and, to begin with, in which all is.
+#[test]
+fn each_function_that_is_null_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let load = |case: u32, empty: Option<&str>| {
+        let name = format!("empty{case}{}", empty.unwrap_or_default());
+        let mut flags = vec![format!("-DCASE={case}"), format!("-DNAME={name}"), "-Wno-unused-variable".into()];
+        flags.extend(empty.map(|function| format!("-DEMPTY={function}")));
+        flags.push("-Wno-unused-function".into());
+        common::c_plugin(folder.path(), "broken.c", &name, &flags.iter().map(String::as_str).collect::<Vec<_>>());
+        let mut registry = Registry::with_core();
+        common::load(folder.path(), &name, &mut registry)
+    };
+    let tables: [(u32, &str, &[&str]); 3] = [
+        (40, "action \"act\"", &["create", "destroy", "caps", "begin_draw", "draw", "end_draw"]),
+        (41, "loader \"load\"", &["probe", "open", "read_region", "close"]),
+        (42, "loader \"load\"", &["probe", "read_mesh"]),
+    ];
+    for (case, of, functions) in tables {
+        // What may be null is null here: `manage`, `unmanage`, `set_option`, `read_all`, `warnings`.
+        // The table and, as in all of them, a geometry.
+        assert_eq!(load(case, None).unwrap().registered.len(), 2, "case {case}");
+        for function in functions {
+            let error = load(case, Some(function)).unwrap_err();
+            let wanted = format!("function {function} of {of} is null, wanted a function");
+            assert_eq!((error.code, error.message), (Code::BadValue, wanted));
+        }
+    }
+}
+
 #[test]
 fn what_is_no_library_is_refused() {
     let folder = tempfile::tempdir().unwrap();
@@ -130,8 +160,11 @@ fn a_name_claimed_twice_names_both_unless_the_config_says_which() {
     let results = common::load_all(&search, &mut registry);
     assert!(results[0].is_ok());
     let error = results[1].as_ref().unwrap_err();
-    let wanted = "action \"zmax\" is claimed by plugin \"kat\" and by plugin \"kit\"; say which in the config";
-    assert!(error.message.starts_with(wanted), "{error}");
+    // All of them at once, and the words that go into the config.
+    let wanted = "action \"zmax\", shader \"tint\", geometry \"octa\", loader \"ramp\" are claimed by plugin \"kat\" \
+                  and by plugin \"kit\"; say which in the config: \
+                  names: {\"octa\": \"kat\", \"ramp\": \"kat\", \"tint\": \"kat\", \"zmax\": \"kat\"}";
+    assert_eq!(error.message, wanted);
 
     let names = [("zmax", "kat"), ("tint", "kit"), ("octa", "kat"), ("ramp", "kit")];
     search.names = names.map(|(name, plugin)| (name.to_owned(), plugin.to_owned())).into();

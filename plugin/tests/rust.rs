@@ -169,6 +169,21 @@ fn panic_while_registering_is_an_error() {
     }
 }
 
+/// The crate that the other tests build and load is refused by the compiler where panics abort.
+#[test]
+fn a_crate_whose_panics_abort_does_not_compile() {
+    common::rust_plugin();
+    let mut command = std::process::Command::new(env!("CARGO"));
+    command.args(["check", "--offline", "--quiet", "--config", "profile.dev.panic='abort'", "--manifest-path"]);
+    command.arg(common::root().join("tests/plugins/rust/Cargo.toml"));
+    command.arg("--target-dir").arg(Path::new(env!("CARGO_TARGET_TMPDIR")).join("plugins"));
+    let output = command.env_remove("RUSTFLAGS").env_remove("CARGO_TARGET_DIR").output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(!output.status.success(), "{said}");
+    let wanted = "error: a Volact plugin cannot be built with panic = \"abort\": a panic would end its host";
+    assert!(said.contains(wanted) && said.contains("src/lib.rs"), "{said}");
+}
+
 fn file(folder: &Path, content: &str) -> std::path::PathBuf {
     let path = folder.join("file");
     fs::write(&path, content).unwrap();
@@ -206,12 +221,20 @@ fn loaders_that_fail_or_panic_are_errors() {
         assert_eq!(volume.value([3, 2, 1], 0), 123.0);
         drop(volume);
     }
-    let error = registry.load(file(folder.path(), "GRID probe")).unwrap_err();
-    assert!(matches!(error, LoadError::UnknownFormat { .. }), "{error}");
+    for mode in ["probe", "probe-bomb"] {
+        let error = registry.load(file(folder.path(), &format!("GRID {mode}"))).unwrap_err();
+        assert!(matches!(error, LoadError::UnknownFormat { .. }), "{error}");
+        // Loaders after the one that panicked are asked.
+        let mesh = registry.load_mesh(file(folder.path(), &format!("WEDGE {mode}"))).unwrap();
+        assert_eq!(mesh.name, "wedge");
+    }
     let error = cause(registry.load(file(folder.path(), "GRID invalid")).unwrap_err());
     assert!(error.contains("mode is invalid, wanted another [bad value]"), "{error}");
     let error = cause(registry.load_mesh(file(folder.path(), "WEDGE read_mesh")).unwrap_err());
-    assert!(error.contains("in read_mesh [panicked]"), "{error}");
+    assert_eq!(error, "plugin \"menagerie\": it panicked: in read_mesh [panicked]");
+    let error = cause(registry.load_mesh(file(folder.path(), "WEDGE read_mesh-bomb")).unwrap_err());
+    assert_eq!(error, "plugin \"menagerie\": it panicked [panicked]");
+    assert!(registry.load_mesh(file(folder.path(), "WEDGE")).is_ok(), "the host goes on");
 }
 
 #[test]

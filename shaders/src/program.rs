@@ -161,7 +161,10 @@ fn check_source(declaration: &Declaration, compositing: Compositing, source: &Sh
     if !errors.is_empty() {
         return Err(errors);
     }
-    let prelude = prelude(declaration, compositing);
+    let mut prelude = prelude(declaration, compositing);
+    if compositing != Compositing::Over && !refuse::has_function_like(text, Entry::Value.name()) {
+        prelude.push_str(&signatures::plain_value(declaration));
+    }
     let whole = format!("{prelude}{text}");
     let start = prelude.len();
     let parsed = on_a_large_stack(|| naga::front::wgsl::parse_str(&whole))?;

@@ -133,9 +133,10 @@ pub fn built_in(word: &str) -> bool {
 fn declared(text: &str, tokens: &[Token], i: usize) -> Option<bool> {
     let global = tokens[i].depth == 0;
     let mut at = i.checked_sub(1)?;
-    // Past the address space of `var<…>`.
+    // Past the address space of `var<…>`; other `>` end arrows, types and comparisons.
     if tokens[at].is('>') {
-        at = tokens[..at].iter().rposition(|t| t.is('<'))?.checked_sub(1)?;
+        let open = tokens[..at].iter().rposition(|t| t.kind != Kind::Word && !t.is(','))?;
+        at = open.checked_sub(1).filter(|_| tokens[open].is('<'))?;
         return (&text[tokens[at].range.clone()] == "var").then_some(global);
     }
     match &text[tokens[at].range.clone()] {
@@ -223,6 +224,11 @@ pub fn functions(text: &str) -> Vec<(&str, std::ops::Range<usize>)> {
     let tokens = tokens(text);
     let declared = tokens.windows(2).filter(|w| &text[w[0].range.clone()] == "fn" && w[1].kind == Kind::Word);
     declared.map(|w| (&text[w[1].range.clone()], w[1].range.clone())).collect()
+}
+
+/// Whether a text declares a function of that name, or of one so near that it may be meant.
+pub fn has_function_like(text: &str, name: &str) -> bool {
+    nearest(name, functions(text).iter().map(|(own, _)| *own)).is_some()
 }
 
 /// The error of a function that must be there and is not.

@@ -313,6 +313,15 @@ pub fn prelude(declaration: &Declaration, compositing: Compositing) -> String {
     text
 }
 
+/// The function `value` of a shader that has none of its own: the value of the first volume declared,
+/// else the number of the first attribute; empty where there is neither.
+pub fn plain_value(declaration: &Declaration) -> String {
+    let first = |wanted| declaration.parameters.iter().find(|p| kind_of(p) == Some(wanted)).map(|p| &p.name);
+    let read = first(ParameterType::Volume).map(|name| format!("{name}(s.position)"));
+    let read = read.or_else(|| first(ParameterType::Attribute).map(|name| format!("{name}(s)")));
+    read.map_or_else(String::new, |read| format!("fn value(s: Sample) -> f32 {{ return {read}; }}\n"))
+}
+
 /// Every name that a shader's declaration takes, with the parameter that takes it.
 pub fn names<'a>(declaration: &'a Declaration, compositing: Compositing) -> Vec<(String, usize)> {
     let of = |(i, p): (usize, &'a ParameterDecl)| {

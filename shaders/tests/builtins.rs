@@ -152,6 +152,11 @@ fn all_sources_are_right_and_small() {
         Kernel::<f64>::new(&program, Entry::Shade, &uniforms(&map)).unwrap();
         let text = &entry.source.as_ref().unwrap().text;
         assert!(text.starts_with(&format!("// {name}: ")), "{name} has a header");
+        // What is computed has a source, with its year; `tangent_space` follows a product.
+        let header: String = text.lines().take_while(|line| line.starts_with("//")).collect();
+        let year = |word: &str| word.len() == 4 && (word.starts_with("19") || word.starts_with("20"));
+        let cited = header.split(|c: char| !c.is_ascii_digit()).any(year);
+        assert!(cited || header.contains("OpenGL Volumizer"), "{name} cites no source");
     }
 }
 
@@ -365,6 +370,15 @@ fn built_in_shaders_are_recognised_by_what_they_do() {
         };
         assert_eq!(of(&entry), wanted, "{}", entry.declaration.name);
         assert_eq!(recognise(&Program::new(&entry).unwrap(), false), None);
+    }
+    // What the compositing takes is that of the volume, whether it is written or not.
+    for name in ["mip", "minip", "average", "xray"] {
+        let mut entry = shipped(name);
+        let mut text = (*entry.source.unwrap()).clone();
+        text.text = text.text.replace("fn value(s: Sample) -> f32 { return volume(s.position); }", "");
+        assert!(!text.text.contains("fn value"));
+        entry.source = Some(text.into());
+        assert_eq!(of(&entry).map(Native::name), Some(name));
     }
     let with = |text: &str| {
         let mut entry = shipped("lut");

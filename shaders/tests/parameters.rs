@@ -215,6 +215,30 @@ fn a_table_left_out_is_grey_over_the_range() {
     assert_eq!(machine.output(0), [150.0]);
 }
 
+/// A shader of values along the ray needs no `value` of its own where there is something to take.
+#[test]
+fn value_left_out_is_the_first_volume_else_the_first_attribute() {
+    let shade = "fn shade(s: Sample) -> Medium { return medium(vec3(s.value), 1.0); }";
+    let flat = |parameters| Program::new(&entry(shade, Compositing::Minimum, parameters)).unwrap();
+    let value = |parameters| {
+        let (program, map) = (flat(parameters), map(&[]));
+        let kernel = Kernel::<f64>::new(&program, Entry::Value, &uniforms(&map)).unwrap();
+        let inputs: Vec<Field> = kernel.inputs().map(|input| input.field).collect();
+        let rows: Vec<&[f64]> = [[3.0], [4.0], [5.0]].iter().take(inputs.len()).map(|r| r.as_slice()).collect();
+        let mut machine = Machine::new(&kernel);
+        // A volume's number is the parameter's place and the position.
+        let of = |f: volact_shaders::eval::Function, p: &[f64]| vec![1000.0 * f.parameter as f64 + p[0]];
+        machine.run(1, &rows, &mut Of(kernel.functions().to_vec(), of)).unwrap();
+        (inputs, machine.output(0)[0])
+    };
+    let number = || required("n", ParameterType::Attribute);
+    let volumes = || vec![number(), required("b", ParameterType::Volume), required("a", ParameterType::Volume)];
+    assert_eq!(value(volumes()).1, 1003.0);
+    let (inputs, of_attribute) = value(vec![required("t", ParameterType::Table), number()]);
+    assert!(matches!(inputs.as_slice(), [Field::Attribute(1)]), "{inputs:?}");
+    assert_eq!(of_attribute, 3.0);
+}
+
 /// Values of volumes where a sample is can be inputs, where every sample has them.
 #[test]
 fn values_at_own_positions_are_inputs_where_asked_for() {

@@ -4,7 +4,7 @@ mod common;
 
 use common::{entry, refused, required};
 use volact_core::{Compositing, ParameterDecl, ParameterType};
-use volact_shaders::{Program, ShaderError, load, load_folder};
+use volact_shaders::{Entry, Program, ShaderError, load, load_folder};
 
 const SHADE: &str = "fn shade(s: Sample) -> Medium { return Medium(); }\n";
 
@@ -48,6 +48,12 @@ fn compositing_of_values_wants_a_value() {
     let error = flat(SHADE);
     assert!(error.contains("no function `value`, wanted `fn value(s: Sample) -> f32`"), "{error}");
     assert!(error.contains("compositing `maximum` is of this value"), "{error}");
+    // A volume's value stands in for it, but not where a name is nearly that.
+    let with_volume =
+        |text: &str| Program::new(&entry(text, Compositing::Maximum, vec![required("volume", ParameterType::Volume)]));
+    assert!(with_volume(SHADE).unwrap().has(Entry::Value));
+    let error = with_volume(&format!("{SHADE}fn valu(s: Sample) -> f32 {{ return 1.0; }}")).unwrap_err().to_string();
+    assert!(error.contains("; is it `valu`?"), "{error}");
     let both = format!(
         "{SHADE}fn value(s: Sample) -> f32 {{ return 1.0; }}
         fn shade_segment(front: Sample, back: Sample) -> Medium {{ return Medium(); }}"
@@ -135,6 +141,12 @@ fn names_that_would_hide_others_are_refused() {
         assert!(error.contains(wanted), "{text}\n{error}");
         assert!(error.starts_with("test.wgsl:2:"), "{error}");
     }
+    // Arrows and comparisons after a `var<…>` declare nothing.
+    let text = format!(
+        "fn f(p: vec3<f32>) -> f32 {{ var<function> x = 1.0; if x > volume(p) {{ x = 2.0; }} return x; }} {SHADE}"
+    );
+    Program::new(&entry(&text, Compositing::Over, parameters())).unwrap();
+    assert_eq!(refused(&format!("var<private> x: f32; {SHADE}")).matches("test.wgsl:").count(), 1);
     // Inside a function built-ins may be hidden, as WGSL has it, and members have names of their own.
     let text = format!(
         "{SHADE}struct S {{ volume: f32, exp: f32 }} fn f(x: S) -> f32 {{ let step = x.volume; return step; }}"

@@ -1,7 +1,9 @@
 // blend2: two volumes in one place.
 //
 // As overlapping shapes do: extinctions add, and the colour is their mean weighted by extinction
-// (equal weights where both are opaque). The second volume counts only where it is.
+// (equal weights where both are opaque). The second volume counts only where it is. Extinction σ and
+// emission σc of what is in one place add in the equation of transfer, dC = T·Σσc·ds and
+// dT = −T·Σσ·ds (N. Max, "Optical models for direct volume rendering", IEEE TVCG 1(2), 1995, section 4).
 fn shade(s: Sample) -> Medium {
     let a = lookup_table(volume(s.position));
     if !volume2_inside(s.position) { return a; }

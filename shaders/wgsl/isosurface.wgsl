@@ -2,11 +2,14 @@
 //
 // Each control point of `surfaces` is a surface: where the value along the ray crosses its value,
 // there is its colour with its opacity, of no thickness. The framework finds the crossings and
-// merges them in depth; `s.value` is then the surface's value. Light as in `gradient`:
+// merges them in depth; `s.value` is then the surface's value (crossings along rays: S. Parker et
+// al., "Interactive ray tracing for isosurface rendering", IEEE Visualization 1998). Light as in
+// `gradient`:
 //
 //     colour = min(1, c·(ambient + diffuse·n·l) + specular·m^shininess)
 //
-// with n along the gradient in world units, m after Blinn or Phong, light in world space.
+// with n along the gradient in world units, light in world space, and m after J. Blinn, "Models of
+// light reflection for computer synthesized pictures", SIGGRAPH 1977, or B. T. Phong, CACM 18(6), 1975.
 fn value(s: Sample) -> f32 { return volume(s.position); }
 
 // The direction to the light, of length 1, along the axes of the world.

@@ -219,6 +219,8 @@ fn describe_lists_and_tells_in_full() {
     ] {
         assert!(lut.contains(word), "{word:?} in {lut}");
     }
+    let cpu = out(&volact(folder.path(), &["describe", "cpu"]));
+    assert!(cpu.contains("attribute, surface; others by their source\n"), "{cpu}");
     let none = volact(folder.path(), &["describe", "ltu"]);
     assert!(code(&none) == 2 && err(&none).contains("nothing is called \"ltu\"; did you mean \"lut\"?"));
 }

@@ -3,7 +3,7 @@
 //! A block whose first line is a comment with a file's name is that file. Lines of `sh` blocks are
 //! commands of one session in one shell; `sh fails` blocks must fail. A `text` block after them is
 //! what they print. `sh interactive` blocks need somebody to look, and `sh rust` blocks a new
-//! crate: these are passed over, with the files that belong to them.
+//! crate: these are passed over, with the files that belong to them (`xtask/tests/new_plugin.rs` makes the crate).
 
 #![cfg(unix)]
 

@@ -105,7 +105,7 @@ mod tests {
             let made = make(kind, &format!("a-{kind:?}").to_lowercase(), folder.path()).unwrap();
             for file in ["Cargo.toml", "config.ron", "README.md", "src/lib.rs", "tests/plugin.rs"] {
                 let text = fs::read_to_string(made.join(file)).unwrap();
-                assert!(!text.contains("{{"), "{kind:?} {file}");
+                assert!(!text.contains("{{") && !text.contains("A action"), "{kind:?} {file}");
             }
             assert!(
                 make(kind, &format!("a-{kind:?}").to_lowercase(), folder.path()).is_err(),

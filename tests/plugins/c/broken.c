@@ -21,6 +21,23 @@ static VolactActionTable action = { sizeof action, 0, { VOLACT_TEXT("act"), VOLA
 static VolactLoaderTable loader = { sizeof loader, 0, { VOLACT_TEXT("load"), VOLACT_TEXT("1"), VOLACT_TEXT("loads"), 0, 0 }, 0, 0, 0, 0, 0, 0, 0, 0 };
 static VolactShaderTable shader = { sizeof shader, 1, { VOLACT_TEXT("shine"), VOLACT_TEXT("1"), VOLACT_TEXT("shines"), 0, 0 }, VOLACT_TEXT("fn") };
 
+/* Stands for functions that are never called. */
+static int32_t nothing(void) { return VOLACT_OK; }
+
+static void fill_action(void) {
+  action.create = (void *)nothing, action.destroy = (void *)nothing, action.caps = (void *)nothing;
+  action.begin_draw = (void *)nothing, action.draw = (void *)nothing, action.end_draw = (void *)nothing;
+}
+
+static void fill_loader(uint32_t content) {
+  loader.content = content, loader.probe = (void *)nothing;
+  loader.open = (void *)nothing, loader.read_region = (void *)nothing, loader.close = (void *)nothing;
+  if (content == VOLACT_CONTENT_MESH) {
+    loader.open = 0, loader.read_region = 0, loader.close = 0;
+    loader.read_mesh = (void *)nothing;
+  }
+}
+
 static const VolactGeometryTable *geometries[] = { &geometry };
 static const VolactActionTable *actions[] = { &action };
 static const VolactLoaderTable *loaders[] = { &loader };
@@ -72,7 +89,17 @@ int32_t ENTRY(NAME)(const VolactHost *from, VolactAnswer *answer) {
   case 27: loader.content = 9, plugin.loaders = loaders, plugin.loader_count = 1; break;
   case 28: use(&geometry.declaration.name, "", 0); break;
   case 29: plugin.geometries = (void *)((char *)geometries + 1); break;
+  case 30: plugin.shaders = shaders, plugin.shader_count = 1; break;
+  /* Whole tables, but for the function EMPTY. */
+  case 40: plugin.actions = actions, plugin.action_count = 1, fill_action(); break;
+  case 41: plugin.loaders = loaders, plugin.loader_count = 1, fill_loader(VOLACT_CONTENT_VOLUME); break;
+  case 42: plugin.loaders = loaders, plugin.loader_count = 1, fill_loader(VOLACT_CONTENT_MESH); break;
   }
+#if CASE == 40 && defined EMPTY
+  action.EMPTY = 0;
+#elif defined EMPTY
+  loader.EMPTY = 0;
+#endif
   return status;
 }
 #endif

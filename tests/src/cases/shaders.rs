@@ -310,11 +310,16 @@ fn sources(topic: &mut Topic) {
         }
         Ok(())
     });
-    let extremes = "fn value(s: Sample) -> f32 { return volume(s.position) * strength(); }\n\
-                    fn shade(s: Sample) -> Medium { return medium(vec3<f32>(s.value * 0.01, 0.3, 1.0), 0.8); }";
-    for (compositing, name) in [(Compositing::Maximum, "maximum"), (Compositing::Average, "average")] {
-        topic.needing(&needs, format!("source_by_{name}"), "an author's value, reduced along the ray", move |rig| {
-            add(rig, "suite_value", compositing, extremes)?;
+    let own = "fn value(s: Sample) -> f32 { return volume(s.position) * strength(); }\n";
+    let shade = "fn shade(s: Sample) -> Medium { return medium(vec3<f32>(s.value * 0.01, 0.3, 1.0), 0.8); }";
+    for (compositing, name, value) in [
+        (Compositing::Maximum, "source_by_maximum", own),
+        (Compositing::Average, "source_by_average", own),
+        (Compositing::Minimum, "source_without_a_value", ""),
+    ] {
+        let about = "an author's value, or else the first volume's, reduced along the ray";
+        topic.needing(&needs, name, about, move |rig| {
+            add(rig, "suite_value", compositing, &format!("{value}{shade}"))?;
             let look = Appearance::new("suite_value").with("unit_distance", 1.0);
             rig.lattice("picture", &around([Shape::around(&usual(), look)]), &How::step(0.3)).map(|_| ())
         });

@@ -82,7 +82,7 @@ fn refused(registry: &Registry) -> String {
     let mut text = String::new();
     for (name, refused) in registry.shaders().all_refused() {
         let gap = if text.is_empty() { "\nrefused\n" } else { "" };
-        _ = writeln!(text, "{gap}  shader {name}: {}", refused.why.replace('\n', "\n    "));
+        _ = writeln!(text, "{gap}  shader {name}: {}", super::plugins::indented(&refused.why));
     }
     text
 }
@@ -115,7 +115,8 @@ fn capabilities(name: &str, registry: &Registry) -> String {
     let some = |names: &Option<Vec<String>>| names.as_ref().map_or_else(|| "any".to_owned(), |names| names.join(", "));
     let compositing = caps.compositing.iter().map(|c| c.name()).collect::<Vec<_>>().join(", ");
     let mut text = String::new();
-    _ = writeln!(text, "  shaders: {}", some(&caps.shaders));
+    let others = if caps.sources { "; others by their source" } else { "" };
+    _ = writeln!(text, "  shaders: {}{others}", some(&caps.shaders));
     _ = writeln!(text, "  geometries: {}", some(&caps.geometries));
     _ = writeln!(text, "  compositing: {}", if compositing.is_empty() { "none" } else { &compositing });
     let yes = |can: bool| if can { "yes" } else { "no" };

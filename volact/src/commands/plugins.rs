@@ -84,7 +84,9 @@ fn list(plugins: &Plugins) -> String {
                     .iter()
                     .for_each(|r| registration(&mut text, r, ", not taken: see names in the config"));
             }
-            Err(error) => _ = writeln!(text, "\n{}\n  refused: {} [{}]", outcome.name, error.message, error.code),
+            Err(error) => {
+                _ = writeln!(text, "\n{}\n  refused: {} [{}]", outcome.name, indented(&error.message), error.code)
+            }
         }
     }
     let named = |name: &str| plugins.search.wanted.iter().any(|w| w.name.replace('-', "_") == name);
@@ -97,6 +99,11 @@ fn list(plugins: &Plugins) -> String {
         _ = writeln!(text, "  {}: {why}", found.path.display());
     }
     text
+}
+
+/// A message of several lines below the name that it is about.
+pub fn indented(message: &str) -> String {
+    message.replace('\n', "\n    ")
 }
 
 fn registration(text: &mut String, r: &Registration, note: &str) {

@@ -1,7 +1,7 @@
 //! Loads plugins into a registry: each wholly or not at all.
 
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     path::{Path, PathBuf},
 };
 
@@ -13,7 +13,6 @@ use super::{
 };
 use crate::{
     Registry,
-    parameter::Kind,
     plugin::{
         abi::Entry,
         status::{Code, Fault, PluginError},
@@ -132,7 +131,7 @@ fn take(
 ) -> Result<Loaded, Fault> {
     let Offer { name: plugin, version, description, items } = offer;
     let mut next = registry.clone();
-    let (mut registered, mut passed_over) = (Vec::new(), Vec::new());
+    let (mut registered, mut passed_over, mut claims) = (Vec::new(), Vec::new(), Vec::new());
     for (declaration, item) in items {
         let (kind, name) = (declaration.kind, declaration.name.clone());
         let about = Registration { kind, name: name.clone(), version: declaration.version.clone() };
@@ -143,7 +142,8 @@ fn take(
         }
         if next.declaration(kind, &name).is_some() {
             if chosen.is_none() {
-                return Err(claimed(&next, kind, &name, &plugin));
+                claims.push(about);
+                continue;
             }
             next.remove(kind, &name);
         }
@@ -161,16 +161,27 @@ fn take(
         next.set_origin(kind, &name, &plugin);
         registered.push(about);
     }
+    if !claims.is_empty() {
+        return Err(claimed(&next, &claims, &plugin));
+    }
     *registry = next;
     Ok(Loaded { name: plugin, version, description, path: path.map(Path::to_owned), registered, passed_over })
 }
 
-fn claimed(registry: &Registry, kind: Kind, name: &str, plugin: &str) -> Fault {
-    let kind_name = kind.name();
-    let other = match registry.origin(kind, name) {
-        Some(other) => format!("plugin {other:?}"),
-        None => "what is built in".into(),
+/// All names that a plugin claims and that others have, with the words for the config.
+fn claimed(registry: &Registry, claims: &[Registration], plugin: &str) -> Fault {
+    let mut by_other: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    for r in claims {
+        let other = registry.origin(r.kind, &r.name).map_or("what is built in".into(), |o| format!("plugin {o:?}"));
+        by_other.entry(other).or_default().push(format!("{} {:?}", r.kind.name(), r.name));
+    }
+    let claim = |(other, list): (&String, &Vec<String>)| {
+        let verb = if list.len() > 1 { "are" } else { "is" };
+        format!("{} {verb} claimed by plugin {plugin:?} and by {other}", list.join(", "))
     };
-    let cure = format!("say which in the config: names: {{{name:?}: {plugin:?}}}");
-    Fault::new(Code::BadName, format!("{kind_name} {name:?} is claimed by plugin {plugin:?} and by {other}; {cure}"))
+    let all: Vec<_> = by_other.iter().map(claim).collect();
+    let names: BTreeSet<_> = claims.iter().map(|r| &r.name).collect();
+    let cure: Vec<_> = names.iter().map(|name| format!("{name:?}: {plugin:?}")).collect();
+    let message = format!("{}; say which in the config: names: {{{}}}", all.join("; "), cure.join(", "));
+    Fault::new(Code::BadName, message)
 }

@@ -79,9 +79,8 @@ impl Loader for Grid {
     }
 
     fn probe(&self, probe: &Probe<'_>) -> Confidence {
-        if probe.head.starts_with(b"GRID probe") {
-            panic!("in probe");
-        }
+        let text = String::from_utf8_lossy(probe.head);
+        panic_at(text.split_whitespace().nth(1).unwrap_or_default(), "probe");
         if probe.head.starts_with(b"GRID") { Confidence::Content } else { Confidence::No }
     }
 

@@ -175,7 +175,9 @@ fn beside(path: &Path) -> Vec<PathBuf> {
         return entries(folder).into_iter().filter(|p| file_name(p).starts_with(start)).collect();
     }
     let header = fs::metadata(path).is_ok_and(|data| data.len() <= HEADER).then(|| read(path, HEADER)).flatten();
-    let header = header.and_then(|bytes| String::from_utf8(bytes).ok()).unwrap_or_default();
+    // Small numbers behind a header are valid text, too, with signs that no header has.
+    let is_text = |text: &String| !text.contains(|c: char| c.is_control() && !c.is_whitespace());
+    let header = header.and_then(|bytes| String::from_utf8(bytes).ok()).filter(is_text).unwrap_or_default();
     let stem = |name: &str| name.split('.').next().unwrap_or_default().to_owned();
     let ending = |name: &str| Path::new(name).extension().map(|e| e.to_ascii_lowercase());
     let numbered = stem(&name).ends_with(|c: char| c.is_ascii_digit());
@@ -237,11 +239,13 @@ mod tests {
             ("c02.dcm", "\u{1}"),
             (".c03.dcm", "\u{1}"),
             ("c04.dcm~", "\u{1}"),
+            ("d.nrrd", "NRRD0004\n\n\u{1}%\u{2}"),
         ]);
         let path = folder.path();
         assert_eq!(names(path, "a.nhdr", "a.png"), ["a.nhdr", "a.raw.gz", "voxels.raw"]);
         assert_eq!(names(path, "c01.dcm", "x.png"), ["c01.dcm", "c02.dcm"]);
         assert_eq!(names(path, "c%02d.dcm", "x.png"), ["c%02d.dcm", "c01.dcm", "c02.dcm"]);
+        assert_eq!(names(path, "d.nrrd", "x.png"), ["d.nrrd"], "a voxel of 37 is no pattern");
         let of_pattern = names(path, "b.raw.ron", "x.png");
         assert!(of_pattern.contains(&"s1.u8".into()) && of_pattern.contains(&"s2.u8".into()), "{of_pattern:?}");
         assert!(!of_pattern.contains(&"a.png".into()) && !of_pattern.contains(&"a.ron".into()), "{of_pattern:?}");
