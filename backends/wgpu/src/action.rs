@@ -149,6 +149,7 @@ impl WgpuAction {
             let message = "no ray meets any shape; check camera, near and far, and transforms";
             frame.warnings.push(Warning::new(WarningCode::NothingVisible, NAME, message));
         }
+        frame.warnings.extend(drawn.iter().filter_map(|s| s.coarse_for_shear(submitted.step)));
         frame.warnings.extend(method::adjusted(&drawn, &self.drawing.volumes, &self.settings));
         self.emit(&frame);
         frame.method = method::method(&drawn, &self.drawing.volumes, &submitted, &self.settings, &self.gpu);
