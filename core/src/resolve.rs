@@ -8,7 +8,7 @@ use crate::{
     geometry::GeometryError,
     parameter::{ParameterMap, ParameterProblem, ProblemKind},
     shader::ShaderCatalog,
-    shape::ShapeState,
+    shape::{ShapeState, smallest_voxel, thinnest_layer},
 };
 use std::sync::Arc;
 
@@ -84,6 +84,21 @@ impl ResolvedShape {
             Some(ParameterValue::Volume(v)) => Some(v),
             _ => None,
         }
+    }
+
+    /// A warning where the transform shears layers of samples so near each other that samples this far
+    /// apart, in the world, may pass some by.
+    pub fn coarse_for_shear(&self, step: f64) -> Option<Warning> {
+        let texture = self.first_volume()?;
+        let transform = &self.state.transform;
+        let (voxel, layer) = (smallest_voxel(texture, transform), thinnest_layer(texture, transform));
+        let message = || {
+            format!(
+                "sample_distance {step:?} is longer than the {layer:?} between layers of samples, which the \
+                 transform shears so near each other; take a shorter one"
+            )
+        };
+        (layer < 0.49 * voxel && step > layer).then(|| Warning::new(WarningCode::CoarseSampling, &self.name, message()))
     }
 
     /// The first volume that the shader declares and the shape has: with the geometry it says

@@ -5,7 +5,7 @@
 
 use std::sync::{Arc, RwLock};
 
-use glam::{DAffine3, DVec3};
+use glam::{DAffine3, DMat3, DVec3};
 
 use crate::{
     Aabb, Block, Clip, Geometry, ParameterValue, Volume, VolumeTexture, Warning, WarningCode, parameter::ParameterMap,
@@ -214,9 +214,36 @@ pub fn smallest_voxel(texture: &VolumeTexture, transform: &DAffine3) -> f64 {
     chosen.into_iter().map(|a| lengths[a]).fold(f64::INFINITY, f64::min)
 }
 
+/// Smallest distance between neighbouring layers of samples of a texture in world units: that of its
+/// samples, but where a transform shears them nearer.
+pub fn thinnest_layer(texture: &VolumeTexture, transform: &DAffine3) -> f64 {
+    let layers = (transform.matrix3 * DMat3::from_diagonal(texture.voxel_size())).inverse();
+    let dims = texture.data_roi().dims();
+    let distances = (0..3).filter(|&a| dims[a] > 1).map(|a| layers.row(a).length().recip());
+    distances.fold(smallest_voxel(texture, transform), f64::min)
+}
+
 fn default_unit_distance(state: &ShapeState) -> f64 {
     match state.volume() {
         Some(texture) => smallest_voxel(texture, &state.transform),
         None => state.world_bounds().size().length() / 100.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{ScalarType, VolumeDesc};
+
+    #[test]
+    fn layers_are_as_far_apart_as_voxels_but_where_they_are_sheared() {
+        let desc = VolumeDesc { spacing: DVec3::new(1.0, 2.0, 4.0), ..VolumeDesc::new([3, 3, 3], ScalarType::U8, 1) };
+        let texture = VolumeTexture::new(&Volume::new(desc, vec![0u8; 27]).unwrap());
+        let plain = DAffine3::from_axis_angle(DVec3::ONE.normalize(), 0.7) * DAffine3::from_scale(DVec3::splat(3.0));
+        assert!((thinnest_layer(&texture, &plain) - 3.0).abs() < 1e-12);
+        // y leans 10 along x over each unit: layers of x are 1/√(1 + 10²) apart.
+        let leaning = DAffine3::from_mat3(DMat3::from_cols(DVec3::X, DVec3::new(10.0, 1.0, 0.0), DVec3::Z));
+        assert!((thinnest_layer(&texture, &leaning) - 1.0 / 101f64.sqrt()).abs() < 1e-12);
+        assert_eq!(smallest_voxel(&texture, &leaning), 1.0);
     }
 }

@@ -12,6 +12,7 @@
 //!
 //! The tests in `tests/contract/` use [`rig::Setup`], [`scene`], [`meshes`] and [`metrics`] directly.
 
+pub mod atlas;
 pub mod case;
 pub mod cases;
 pub mod catalog;

@@ -117,6 +117,7 @@ impl VulkanAction {
             let message = "no ray meets any shape; check camera, near and far, and transforms";
             all.push(Warning::new(WarningCode::NothingVisible, NAME, message));
         }
+        all.extend(drawn.iter().filter_map(|s| s.coarse_for_shear(made.step.distance)));
         if made.step.is_widened() {
             let message = format!(
                 "max_planes holds planes {:?} apart instead of {:?}: {} of them",

@@ -151,6 +151,7 @@ impl WgpuAction {
             let message = "no ray meets any shape; check camera, near and far, and transforms";
             frame.warnings.push(Warning::new(WarningCode::NothingVisible, NAME, message));
         }
+        frame.warnings.extend(drawn.iter().filter_map(|s| s.coarse_for_shear(submitted.step)));
         frame.warnings.extend(method::adjusted(&drawn, &self.drawing.volumes, &self.settings));
         frame.warnings.extend(without_entry(&drawn));
         self.emit(&frame);

@@ -64,6 +64,16 @@ impl Setup {
         self.with("sample_distance", step)
     }
 
+    /// The action's name.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Its options.
+    pub fn options(&self) -> &Options {
+        &self.options
+    }
+
     /// The action.
     ///
     /// # Errors

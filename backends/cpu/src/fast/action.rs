@@ -166,6 +166,8 @@ impl RenderAction for CpuAction {
             frame.warnings.push(Warning::new(WarningCode::NothingVisible, NAME, message));
         }
         frame.warnings.extend(method::coarse(&drawn, plan.step, &self.resources));
+        frame.warnings.extend(method::lost(&drawn, &self.resources));
+        frame.warnings.extend(drawn.iter().filter_map(|s| s.coarse_for_shear(plan.step)));
         frame.warnings.extend(method::adjusted(&drawn, &self.resources, &self.settings));
         frame.warnings.extend(without_entry(&drawn));
         for warning in frame.warnings.iter().filter(|w| w.severity == Severity::Warning) {

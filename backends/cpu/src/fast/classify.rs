@@ -11,6 +11,8 @@ use volact_core::{mutated, table::ResolvedTable};
 const WANTED_ERROR: f64 = 1e-6;
 /// Unit distances in a segment from which a table may be saturated, and what is then left of light.
 const SATURATED: (f64, f64) = (4.0, 1e-5);
+/// What a segment must be off by for a lost spike to count: half an 8-bit step.
+const SEEN: f64 = 0.5 / 255.0;
 /// Most intervals that are tried.
 const MOST: usize = 1 << 16;
 /// Most intervals for accuracy where nodes miss control points anyway.
@@ -69,6 +71,9 @@ pub struct SegmentTable {
     /// Whether segments of several unit distances hide here how dense they are: next to opaque, they
     /// cannot be cut to a part.
     pub saturated: bool,
+    /// Whether nodes pass over a control point both of whose neighbours are nearer than they are: a
+    /// spike that is not there.
+    pub lost: bool,
     /// How many nodes up to each have any opacity at or just after them.
     seen: Vec<u32>,
 }
@@ -97,7 +102,19 @@ impl SegmentTable {
             let (a, b) = (units.data(lo), units.data(hi));
             table.max_opacity(a.min(b), a.max(b)) > 0.0
         });
-        Self { saturated, ..made }
+        let lost = made.loses(&marks, segment);
+        Self { saturated, lost, ..made }
+    }
+
+    fn loses(&self, marks: &[f64], segment: impl Fn(f64) -> [f64; 4]) -> bool {
+        let [lo, hi] = self.domain;
+        let apart = (hi - lo) / (self.nodes.max(2) - 1) as f64;
+        let differs = |at: f64| {
+            let (exact, held) = (segment(at), self.lookup(at as f32));
+            (0..4).any(|c| (exact[c] - f64::from(held[c])).abs() > SEEN)
+        };
+        let narrow = |m: &[f64]| (m[2] - m[0]).abs() < apart && m[0] != m[1] && m[1] != m[2];
+        marks.windows(3).any(|m| (lo..=hi).contains(&m[1]) && narrow(m) && differs(m[1]))
     }
 
     fn from_nodes(nodes: Vec<[f64; 4]>, error: f64, domain: [f64; 2], opaque: impl Fn(f64, f64) -> bool) -> Self {
@@ -117,7 +134,18 @@ impl SegmentTable {
         // Coordinates are compared before they are clamped: what the first node makes visible is so
         // below it, too.
         let dark = if first == 0 { f32::NEG_INFINITY } else { first as f32 - 1.0 };
-        Self { entries, nodes: count, scale: scale as f32, offset, dark, error, domain, saturated: false, seen }
+        Self {
+            entries,
+            nodes: count,
+            scale: scale as f32,
+            offset,
+            dark,
+            error,
+            domain,
+            saturated: false,
+            lost: false,
+            seen,
+        }
     }
 
     /// Bytes held.
@@ -290,6 +318,17 @@ mod tests {
         let s = SegmentTable::new(&t, PLAIN, None, 2.0);
         assert!((s.lookup(50.0)[3] - 0.75).abs() < 2e-6);
         assert_eq!(s.lookup(100.0)[3], 1.0);
+    }
+
+    #[test]
+    fn spikes_between_nodes_are_known() {
+        let lost = |points: &[(f64, f64)]| SegmentTable::new(&table(points), PLAIN, None, 1.0).lost;
+        let spike =
+            |width: f64, a: f64| [(0.0, 0.0), (0.537, 0.0), (0.537 + width, a), (0.537 + 2.0 * width, 0.0), (1.0, 0.0)];
+        assert!(lost(&spike(1e-6, 0.9)) && lost(&spike(1e-5, 0.1)));
+        assert!(!lost(&spike(0.01, 0.9)) && !lost(&spike(1e-6, 1e-3)));
+        // Steps are between nodes, too, and are there.
+        assert!(!lost(&[(0.0, 0.0), (0.537, 0.0), (0.537, 0.6), (1.0, 0.6)]));
     }
 
     #[test]

@@ -77,6 +77,20 @@ pub fn coarse(drawn: &[&ResolvedShape], step: f64, resources: &Resources) -> Vec
     drawn.iter().filter(saturated).map(warn).collect()
 }
 
+/// Shapes whose tables have spikes between the entries that they are drawn with.
+pub fn lost(drawn: &[&ResolvedShape], resources: &Resources) -> Vec<Warning> {
+    let loses = |s: &&ResolvedShape| resources.tables(s.id).filter(|t| t.loses_spikes()).map(Tables::width);
+    let warn = |s: &&ResolvedShape| {
+        let message = format!(
+            "the lookup table has a spike narrower than the distance of the {} entries that it is drawn with, which \
+             is not seen; widen it, narrow the table to the values around it, or draw with the action reference",
+            loses(s)?
+        );
+        Some(Warning::new(WarningCode::CoarseSampling, &s.name, message))
+    };
+    drawn.iter().filter_map(warn).collect()
+}
+
 /// Settings asked for that a shape's way of drawing has no use for.
 pub fn adjusted(drawn: &[&ResolvedShape], resources: &Resources, settings: &Settings) -> Vec<Warning> {
     let asked = settings.classification == Classification::PreIntegrated;

@@ -22,6 +22,7 @@ pub mod direct;
 pub mod dispatch;
 pub mod fetch;
 pub mod flat;
+pub mod integrals;
 pub mod limits;
 pub mod medium;
 pub mod mesh;

@@ -1,19 +1,21 @@
 //! Whether a table is too sharp for a sample distance and the data.
 //!
 //! At fixed places of the volume, what a segment adds by the value in its middle, and by values
-//! running linearly between its ends, is compared with what it adds by the values along it. The
-//! places and directions depend on nothing but the data ROI, so that the answer does not flicker
-//! while the camera moves.
+//! running linearly between its ends, is compared with what it adds by the values along it: linear
+//! from part to part, and each part by the [integral](super::integrals) of the table over its values,
+//! so that no spike is too narrow to be seen. The places and directions depend on nothing but the data
+//! ROI, so that the answer does not flicker while the camera moves.
 
 use volact_core::{glam::DVec3, table::ResolvedTable};
 
 use super::{
     classify::{SegmentTable, Units, segment},
     fetch::Voxels,
+    integrals::Integrals,
     preintegrate::SegmentPairs,
 };
 
-/// Parts of a segment.
+/// Parts of a segment; an even number.
 const PARTS: usize = 12;
 /// Places looked at.
 const PLACES: usize = 2048;
@@ -55,6 +57,7 @@ pub fn estimate(
     step: DVec3,
 ) -> Estimate {
     let size: [f64; 3] = std::array::from_fn(|a| (voxels.max[a] - voxels.min[a]) as f64);
+    let integrals = Integrals::of(table);
     let mut seen = 0usize;
     let (mut post, mut pre, mut opacity, mut change) = (0f64, 0f64, 0f64, 0f64);
     for n in 0..PLACES {
@@ -64,16 +67,16 @@ pub fn estimate(
         let mut half = [0f64; 3];
         half[n % 3] = 0.5 * step[n % 3];
         let value = |s: f64| plain(voxels, std::array::from_fn(|a| p[a] + s * half[a]));
-        let part = |i: usize| 2.0 * (i as f64 + 0.5) / PARTS as f64 - 1.0;
-        let along: [f32; PARTS] = std::array::from_fn(|i| value(part(i)));
-        let (front, middle, back) = (value(-1.0), value(0.0), value(1.0));
-        let all = || along.iter().copied().chain([front, middle, back]);
+        let along: [f32; PARTS + 1] = std::array::from_fn(|i| value(2.0 * i as f64 / PARTS as f64 - 1.0));
+        let (front, middle, back) = (along[0], along[PARTS / 2], along[PARTS]);
+        let all = || along.iter().copied();
         let (lo, hi) = (all().fold(f32::INFINITY, f32::min), all().fold(f32::NEG_INFINITY, f32::max));
         if all().any(f32::is_nan) || !fine.sees(lo, hi) {
             continue;
         }
         let classify = |v: f64| table.classify(units.data(v));
-        let exact = composite(|i| classify(f64::from(along[i])), h);
+        let ends = along.map(|v| integrals.end(units.data(f64::from(v))));
+        let exact = composite(|i| integrals.mean(&ends[i], &ends[i + 1]), h);
         let linear = pairs.map_or([0.0; 4], |p| p.lookup(front, back).map(f64::from));
         let whole = segment(classify(f64::from(middle)), h);
         let error = |e: [f64; 4]| (0..4).map(|c| (e[c] - exact[c]).powi(2)).fold(0.0, f64::max);
@@ -95,13 +98,14 @@ pub fn estimate(
     Estimate { post: pixel(post), pre: pixel(pre), change }
 }
 
-/// A segment of equal parts, each with its colour and opacity.
-fn composite(classify: impl Fn(usize) -> [f64; 4], h: f64) -> [f64; 4] {
+/// A segment of equal parts, each with its means of emission and extinction.
+fn composite(density: impl Fn(usize) -> [f64; 4], h: f64) -> [f64; 4] {
     let mut out = [0f64; 4];
     for i in 0..PARTS {
-        let add = segment(classify(i), h / PARTS as f64);
-        let left = 1.0 - out[3];
-        out = std::array::from_fn(|c| out[c] + left * add[c]);
+        let [r, g, b, sigma] = density(i);
+        let alpha = -(-sigma * h / PARTS as f64).exp_m1();
+        let share = if sigma > 0.0 { (1.0 - out[3]) * alpha / sigma } else { 0.0 };
+        out = [out[0] + share * r, out[1] + share * g, out[2] + share * b, out[3] + share * sigma];
     }
     out
 }

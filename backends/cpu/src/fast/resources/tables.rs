@@ -142,6 +142,11 @@ impl Tables {
         matches!(&self.made, Made::Table { table, .. } if table.saturated)
     }
 
+    /// Whether a spike of the table is between its entries: see [`SegmentTable::lost`].
+    pub fn loses_spikes(&self) -> bool {
+        matches!(&self.made, Made::Table { table, pairs: None } if table.lost)
+    }
+
     /// Entries along an axis; 0 where nothing is tabulated.
     pub fn width(&self) -> usize {
         match &self.made {
