@@ -2,8 +2,8 @@
 //!
 //! Between two control points opacity a is linear in the value, and with F(a) = (1 − a) ln(1 − a) + a the
 //! mean of σ = −ln(1 − a) over any part is (F(a₁) − F(a₀))/(a₁ − a₀), finite up to a = 1. Sums up to each
-//! point make any stretch two look-ups, however narrow what it crosses. Colour is taken in the middle of
-//! a part: these are for estimates.
+//! point make any stretch two look-ups, however narrow what it crosses. Colour is linear in a, and
+//! ∫ −a ln(1 − a) da = (1 − a²) ln(1 − a)/2 + a/2 + a²/4.
 
 use volact_core::{ControlPoint, table::ResolvedTable};
 
@@ -62,7 +62,7 @@ impl<'a> Integrals<'a> {
         }
         let end = after.saturating_sub(1);
         let (point, beyond) = (&self.points[end], value - self.points[end].value);
-        let outside = density(point.color, [point.opacity; 2]);
+        let outside = density([point.color; 2], [point.opacity; 2]);
         std::array::from_fn(|c| self.sums[end][c] + beyond * outside[c])
     }
 
@@ -71,7 +71,7 @@ impl<'a> Integrals<'a> {
         let after = self.points.partition_point(|p| p.value <= value);
         let (a, b) = (&self.points[after.saturating_sub(1)], &self.points[after.min(self.points.len() - 1)]);
         let t = if after > 0 && b.value > a.value { (value - a.value) / (b.value - a.value) } else { 0.0 };
-        density(mixed(a, b, t), [mix(a.opacity, b.opacity, t); 2])
+        density([mixed(a, b, t); 2], [mix(a.opacity, b.opacity, t); 2])
     }
 }
 
@@ -83,19 +83,29 @@ fn mixed(a: &ControlPoint, b: &ControlPoint, t: f64) -> [f64; 3] {
     std::array::from_fn(|c| mix(a.color[c], b.color[c], t))
 }
 
-/// Means of σ·colour and of σ where opacity runs linearly.
-fn density(color: [f64; 3], [from, to]: [f64; 2]) -> [f64; 4] {
-    let integral = |a: f64| if a < 1.0 { (1.0 - a) * (-a).ln_1p() + a } else { 1.0 };
-    let near = (to - from).abs() <= 1e-6 * from.max(to);
-    let sigma = if near { -(-0.5 * (from + to)).ln_1p() } else { (integral(to) - integral(from)) / (to - from) };
-    let sigma = sigma.min(OPAQUE);
-    [sigma * color[0], sigma * color[1], sigma * color[2], sigma]
+/// Means of σ·colour and of σ where opacity and colour run linearly from one end to the other.
+fn density([from, to]: [[f64; 3]; 2], [a, b]: [f64; 2]) -> [f64; 4] {
+    let change = b - a;
+    if change.abs() <= 1e-4 * (1.0 - a.max(b)) {
+        // Extinction is as good as linear, too.
+        let [p, q] = [a, b].map(|a| (-(-a).ln_1p()).min(OPAQUE));
+        let mean = |c: f64, d: f64| (p * (2.0 * c + d) + q * (c + 2.0 * d)) / 6.0;
+        return [mean(from[0], to[0]), mean(from[1], to[1]), mean(from[2], to[2]), 0.5 * (p + q)];
+    }
+    // The integrals of σ and of a·σ over a.
+    let first = |a: f64| if a < 1.0 { (1.0 - a) * (-a).ln_1p() + a } else { 1.0 };
+    let second = |a: f64| if a < 1.0 { 0.5 * (1.0 - a * a) * (-a).ln_1p() + 0.5 * a + 0.25 * a * a } else { 0.75 };
+    let sigma = (first(b) - first(a)) / change;
+    // How far along σ lies on average: 0.5 where it is constant.
+    let along = ((second(b) - second(a)) / change - a * sigma) / change;
+    let mean = |c: usize| from[c] * sigma + (to[c] - from[c]) * along;
+    [mean(0), mean(1), mean(2), sigma]
 }
 
 /// The integral over a part of a piece, from its lower end.
 fn piece(a: &ControlPoint, b: &ControlPoint, part: f64) -> [f64; 4] {
     let width = (b.value - a.value) * part;
-    density(mixed(a, b, 0.5 * part), [a.opacity, mix(a.opacity, b.opacity, part)]).map(|v| width * v)
+    density([a.color, mixed(a, b, part)], [a.opacity, mix(a.opacity, b.opacity, part)]).map(|v| width * v)
 }
 
 #[cfg(test)]
@@ -139,6 +149,21 @@ mod tests {
                 let found = mean(&integrals, ends)[3];
                 assert!((found - wanted).abs() < 1e-9, "{ends:?}: {found}, wanted {wanted}");
             }
+        }
+    }
+
+    #[test]
+    fn colour_is_weighed_by_extinction_over_any_stretch() {
+        let point = |value, a: f64, red| ControlPoint { value, color: [red, 0.5, 0.0], opacity: a };
+        let points = vec![point(0.0, 0.1, 0.0), point(1.0, 0.9, 1.0), point(2.0, 1e-3, 0.2), point(3.0, 1e-3, 0.8)];
+        let table = LookupTable::from_points(points).unwrap().resolve([0.0, 3.0]);
+        let integrals = Integrals::of(&table);
+        for ends in [[0.3, 0.31], [0.0, 1.0], [0.8, 1.7], [1.9999, 2.5], [0.55, 0.550_01], [2.1, 2.9]] {
+            // The midpoint rule.
+            let at = |i: i32| table.classify(ends[0] + (ends[1] - ends[0]) * (f64::from(i) + 0.5) / 2e4);
+            let wanted = (0..20_000).map(|i| -at(i)[0] * (-at(i)[3]).ln_1p()).sum::<f64>() / 2e4;
+            let found = mean(&integrals, ends)[0];
+            assert!((found / wanted - 1.0).abs() < 1e-5, "{ends:?}: {found}, wanted {wanted}");
         }
     }
 }
