@@ -309,6 +309,7 @@ impl PlannedAction {
         let of = (desc, self.frames, Density::Few);
         let mut search = Search::new((&mut self.actors, truth), shapes, of, voxel(resolved), &mut self.tail);
         let look = search.look(&candidate, kept.wanted, kept.order)?;
+        let look = look.after(&self.at(look.k, &kept.look, kept.order));
         kept.steady.k = kept.wanted;
         if let Some(bound) = self.goals.bound {
             kept.steady.follow(look.error(self.goals.bound), kept.order, bound.value());

@@ -59,7 +59,7 @@ impl Tail {
 /// Exceedances of a high threshold follow a generalised Pareto distribution (J. Pickands, *Statistical inference
 /// using extreme order statistics*, 1975); its shape and scale are those with the sample's mean and variance
 /// (J. Hosking, J. Wallis, *Parameter and quantile estimation for the generalized Pareto distribution*, 1987),
-/// the shape no larger than 0.3, so that chance does not make them infinite.
+/// the shape no larger than 0.45, so that chance does not make them infinite.
 fn extrapolated(sample: &[f64], pixels: usize) -> f64 {
     let exceeding = (sample.len() / 20).max(8);
     let Some(&threshold) = sample.get(exceeding) else { return sample.first().copied().unwrap_or(0.0) };
@@ -73,7 +73,7 @@ fn extrapolated(sample: &[f64], pixels: usize) -> f64 {
         return sample[0];
     }
     let ratio = if variance > 0.0 { mean * mean / variance } else { 1.0 };
-    let shape = (0.5 * (1.0 - ratio)).clamp(-0.5, 0.3);
+    let shape = (0.5 * (1.0 - ratio)).clamp(-0.5, 0.45);
     let scale = mean * (1.0 - shape);
     let over = if shape.abs() < 1e-3 { expected.ln() } else { (expected.powf(shape) - 1.0) / shape };
     (threshold + scale * over).max(sample[0])

@@ -12,16 +12,16 @@ use crate::{ActionError, FrameDesc, Opaque, OpaqueDepth, Options, Pixels, Shape,
 /// Which of the pixels are in a sparse picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Density {
-    /// One of 400, from 256 to 4096: the mean square shows in them, and with those of earlier frames the largest.
+    /// One of 400, from 256 to 4096: with those of earlier frames, errors show in them.
     Few,
-    /// One of 100, from 1024 to 16,384: the largest shows.
+    /// One of 100, from 1024 to 16,384: errors show in them alone.
     Many,
 }
 
 impl Density {
     /// For the first look at a scene.
     pub fn first(bound: Option<Bound>) -> Self {
-        if matches!(bound, Some(Bound::MaxError(_))) { Self::Many } else { Self::Few }
+        if bound.is_some() { Self::Many } else { Self::Few }
     }
 
     /// One of so many pixels, at least and at most so many.
@@ -40,7 +40,7 @@ const FINER: i32 = 8;
 const LOOKS: usize = 4;
 
 /// What an estimate of a bound is multiplied by: for the largest error, and the mean square.
-const SAFETY: [f64; 2] = [2.2, 1.2];
+const SAFETY: [f64; 2] = [2.0, 1.2];
 
 /// One way to draw.
 #[derive(Clone, Debug)]
@@ -71,6 +71,13 @@ pub struct Look {
 }
 
 impl Look {
+    /// This look with what was known before, of the same step: more at once, less little by little. Where errors are
+    /// those of few pixels, a sparse picture may miss them all.
+    pub fn after(self, before: &Self) -> Self {
+        let mean = |old: f64, new: f64| (0.7 * old * old + 0.3 * new * new).sqrt().max(new);
+        Self { max: mean(before.max, self.max), rmse: mean(before.rmse, self.rmse), ..self }
+    }
+
     /// The error of the kind that is bounded, with a margin.
     pub fn error(&self, bound: Option<Bound>) -> f64 {
         match bound {
