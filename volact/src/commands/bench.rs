@@ -46,7 +46,7 @@ impl Args {
 
     /// The scene file, if it is one that is drawn.
     pub fn scene(&self) -> Option<&Path> {
-        Some(self.source.input.as_path()).filter(|path| path.extension().is_some_and(|e| e == "ron"))
+        self.source.scene_file()
     }
 }
 

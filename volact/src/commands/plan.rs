@@ -48,7 +48,7 @@ impl Args {
 
     /// The scene file, if it is one that is planned for.
     pub fn scene(&self) -> Option<&Path> {
-        Some(self.source.input.as_path()).filter(|path| path.extension().is_some_and(|e| e == "ron"))
+        self.source.scene_file()
     }
 }
 

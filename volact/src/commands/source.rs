@@ -170,6 +170,11 @@ impl Args {
         Ok(Opened { scene, notes, config, options })
     }
 
+    /// The scene file, if it is one that is drawn.
+    pub fn scene_file(&self) -> Option<&Path> {
+        Some(self.input.as_path()).filter(|path| path.extension().is_some_and(|e| e == "ron"))
+    }
+
     /// What is asked for: on the command line, else in the scene. A distance of samples there asks for nothing.
     pub fn goals(&self, scene: &Scene) -> Goals {
         let bound = self.max_error.map(Bound::MaxError).or(self.rmse.map(Bound::Rmse));
