@@ -12,6 +12,9 @@ use crate::{
     resolve::ResolvedShape,
 };
 
+/// Actions that are not taken, with the reasons.
+type Refused = Vec<(String, String)>;
+
 /// An action that can draw a scene and manages its shapes.
 pub struct Choice<A = Box<dyn RenderAction>> {
     /// Its registered name.
@@ -19,7 +22,7 @@ pub struct Choice<A = Box<dyn RenderAction>> {
     /// The action, which manages all shapes.
     pub action: A,
     /// The actions that were preferred but not taken, with the reasons.
-    pub refused: Vec<(String, String)>,
+    pub refused: Refused,
 }
 
 impl<A> fmt::Debug for Choice<A> {
@@ -151,7 +154,7 @@ fn actors(
     named: Option<&str>,
     options: &Options,
     shapes: &[Shape],
-) -> Result<(Vec<Actor>, Vec<(String, String)>), SelectError> {
+) -> Result<(Vec<Actor>, Refused), SelectError> {
     let first = select(registry, config, named, options, shapes)?;
     let mut refused = first.refused;
     let given = config.options_of(&first.name, options);

@@ -104,7 +104,15 @@ impl Scene {
         ];
         let stem = file.split('/').next().unwrap_or(file);
         let (bound, size) = (BOUNDS[(number + number / 4) % BOUNDS.len()], SIZES[number % SIZES.len()]);
-        Ok(Self { name: format!("{stem} {look}"), shape, bound, size, voxel, view, perspective: number % 3 != 0 })
+        Ok(Self {
+            name: format!("{stem} {look}"),
+            shape,
+            bound,
+            size,
+            voxel,
+            view,
+            perspective: !number.is_multiple_of(3),
+        })
     }
 
     fn frame(&self, number: usize) -> FrameDesc {

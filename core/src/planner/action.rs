@@ -559,10 +559,11 @@ impl RenderAction for PlannedAction {
         let open = self.lifecycle.end()?;
         let shapes = std::mem::take(&mut self.drawn);
         let resolved: Vec<ResolvedShape> = open.drawn_shapes().cloned().collect();
-        if self.goals.bound.is_some() && self.goals.time.is_some() {
-            if let Some(frame) = self.refined(&open.desc, &shapes, &resolved)? {
-                return Ok(frame);
-            }
+        if self.goals.bound.is_some()
+            && self.goals.time.is_some()
+            && let Some(frame) = self.refined(&open.desc, &shapes, &resolved)?
+        {
+            return Ok(frame);
         }
         let plan = self.decide(&open.desc, &shapes, &resolved)?;
         self.execute(plan, &open.desc, &shapes)

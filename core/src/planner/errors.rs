@@ -106,7 +106,8 @@ mod tests {
 
     #[test]
     fn largest_of_many_is_told_from_few_of_known_distributions() {
-        let cases: [(&str, fn(f64) -> f64); 4] = [
+        type Quantile = fn(f64) -> f64;
+        let cases: [(&str, Quantile); 4] = [
             ("even", |u| u),
             ("exponential", |u| -(1.0 - u).ln()),
             ("a hump", |u| 1.0 - (1.0 - u).sqrt()),
