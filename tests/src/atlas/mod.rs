@@ -5,7 +5,7 @@
 //! its own (a closed form, else the certified reference) and held from both sides: a method that holds
 //! stays below its bound on all rungs, one that fails is seen to fail, and is right at the easy end, so
 //! that it is the knob that makes it fail. Methods are actions with their options, and, where Volact has
-//! no such method because it fails, a plain model of it ([`naive`]), said to be one.
+//! no such method because it fails, a plain model of it (`naive`), said to be one.
 //!
 //! An [`Answer`] is what Volact does about it, with the check that it does. `docs/stability.md` is
 //! [written](page) from this; `tests/stability.rs` holds both to the code.
