@@ -270,7 +270,8 @@ fn a_plan_alone_draws_nothing_but_few_pixels() {
     let mut desc = seen(35.0);
     (desc.width, desc.height) = (800, 600);
     let (plan, sparse) = action.plan(&desc, std::slice::from_ref(&shape)).unwrap();
-    assert!(sparse.width * sparse.height < 2000 && plan.sparse < 2000, "{plan:?}");
+    // About one of a hundred.
+    assert!(sparse.width * sparse.height < 6000 && plan.sparse < 6000, "{plan:?}");
     assert!(plan.kept && !plan.considered.is_empty());
     assert_eq!(Some(sparse.method.sample_distance), plan.step);
     // Drawing then takes what was planned.

@@ -92,7 +92,7 @@ fn what_is_set_is_kept_and_contradictions_are_refused() {
     for (arguments, wanted) in [
         (&["--max-error", "0.1", "--rmse", "0.1"][..], "cannot be used with"),
         (&["--max-error", "0.1", "--step", "1"], "cannot be used with"),
-        (&["--max-error", "-1"], "wanted a positive, finite number"),
+        (&["--max-error=-1"], "wanted a positive, finite number"),
         (&["--milliseconds", "nan"], "wanted a positive, finite number"),
         (&["--action", "planed", "--rmse", "0.1"], "planned"),
     ] {

@@ -195,7 +195,7 @@ fn wrong_options_and_names_are_refused() {
     assert!(fails(Setup::new("cpu").with("classification", "best")).contains("post"));
     assert!(fails(Setup::new("cpu").with("termination", 1.5)).contains("termination"));
     assert!(fails(Setup::new("reference").with("method", "rays")).contains("sample_distance"));
-    assert!(fails(Setup::new("gpu")).contains("known: checked, cpu, null, reference"));
+    assert!(fails(Setup::new("gpu")).contains("known: checked, cpu, null, planned, reference"));
     let mut action = Setup::cpu().action();
     assert!(action.set_option("threads", "many".into()).is_err());
     assert!(action.set_option("sample_distance", 0.5.into()).is_ok());
